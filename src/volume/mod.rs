@@ -1,0 +1,246 @@
+//! Grids of voxels: what they hold, where they stand, how they are read, built and kept.
+//!
+//! **Index space** is cell-cornered: along an axis of `n` voxels the continuous index `u` runs over `0..n`, voxel `i`
+//! has its centre at `i + 0.5`, and the volume's box is `[0, n]`. [`Volume::world_from_index`] takes that box to the
+//! world with its centre at the origin. World axes of a scan are NIfTI's: x right, y anterior, z superior.
+//!
+//! **Values** are `raw · slope + inter`; voxels stay in the type of their file, so that a byte volume takes a byte a
+//! voxel on the device too.
+
+pub mod builtin;
+mod cache;
+mod cells;
+mod inflate;
+mod info;
+mod nifti;
+mod nrrd;
+mod nrrd_header;
+mod nrrd_write;
+mod parallel;
+mod raw;
+mod read;
+mod samples;
+mod store;
+mod store_files;
+mod voxels;
+
+pub use cells::{CELL, Cells};
+pub use info::VolumeInfo;
+pub use nrrd_write::write_nrrd;
+pub use raw::{RawParams, RawQuery};
+pub use read::{FORMATS, VolumeLimits, read};
+pub use samples::{Endian, RawType};
+pub use store::{Store, StoreLimits};
+pub use voxels::{Histogram, VoxelType, Voxels};
+
+use crate::error::{Error, Result};
+use glam::{DAffine3, DMat3, DVec3};
+
+/// Voxel spacings outside of this range are taken for damage; in mm these are a picometre and a thousand kilometres.
+const SPACING_RANGE: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
+
+/// What a reader or a built-in knows of a volume; [`Volume::new`] checks it and derives the rest.
+#[derive(Debug)]
+pub struct NewVolume {
+    /// Voxels along x, y, z.
+    pub dims: [usize; 3],
+    /// Distance between neighbouring voxels in world units; used only where there is no `linear`.
+    pub spacing: [f64; 3],
+    /// Columns are the steps from voxel to voxel along x, y, z in world units, if the file says so.
+    pub linear: Option<DMat3>,
+    /// The voxels, x fastest, then y, then z.
+    pub voxels: Voxels,
+    /// value = raw · slope + inter.
+    pub slope: f64,
+    /// value = raw · slope + inter.
+    pub inter: f64,
+    /// A name for people.
+    pub name: String,
+    /// Where it came from: `nifti`, `nrrd`, `raw`, `builtin` or `field`.
+    pub format: String,
+    /// Row-major map from integer voxel indices to patient space (RAS) in the file's own length unit.
+    pub file_affine: Option<[[f64; 4]; 4]>,
+    /// The world's length unit: `mm`, or `unit` for what has no physical size.
+    pub unit: String,
+    /// What was lost or assumed while reading, in words for the sender.
+    pub notes: Vec<String>,
+}
+
+/// A grid of finite voxels (NaN where there is no value) with its place in the world and its statistics.
+#[derive(Debug)]
+pub struct Volume {
+    parts: NewVolume,
+    world_from_index: DAffine3,
+    range: [f64; 2],
+    non_finite: u64,
+    histogram: Histogram,
+    cells: Cells,
+}
+
+impl Volume {
+    /// Checks the parts and computes range, histogram and cells. Infinite voxels become NaN.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] where spacing, axes or scaling make no sense; [`Error::Internal`] if voxels do not fit `dims`.
+    pub fn new(mut parts: NewVolume) -> Result<Self> {
+        let count = parts.dims.iter().try_fold(1usize, |product, &n| product.checked_mul(n));
+        if count != Some(parts.voxels.len()) || parts.voxels.is_empty() {
+            return Err(Error::internal(format!("{} voxels for dims {:?}", parts.voxels.len(), parts.dims)));
+        }
+        if !(parts.slope.is_finite() && parts.slope != 0.0 && parts.inter.is_finite()) {
+            return Err(Error::invalid(
+                "header:scl_slope",
+                "the scaling is not finite, or zero",
+                "finite, slope not 0",
+            ));
+        }
+        let linear = match parts.linear {
+            Some(linear) => linear,
+            None => DMat3::from_diagonal(DVec3::from_array(parts.spacing)),
+        };
+        parts.spacing = checked_axes(linear, "header:spacing")?;
+        let half = DVec3::from_array(parts.dims.map(|n| n as f64 / 2.0));
+        let world_from_index = DAffine3::from_mat3_translation(linear, -(linear * half));
+
+        let non_finite = parts.voxels.make_finite_or_nan();
+        let (cells, raw_range) = Cells::new(&parts.voxels, parts.dims, parts.slope, parts.inter);
+        let range = match raw_range {
+            Some(raw) => physical_range(raw, parts.slope, parts.inter)?,
+            None => [0.0; 2],
+        };
+        let histogram = Histogram::new(&parts.voxels, parts.slope, parts.inter, range);
+        Ok(Self { parts, world_from_index, range, non_finite, histogram, cells })
+    }
+
+    /// Voxels along x, y, z.
+    pub fn dims(&self) -> [usize; 3] {
+        self.parts.dims
+    }
+
+    /// World distance between neighbouring voxels along each index axis.
+    pub fn spacing(&self) -> [f64; 3] {
+        self.parts.spacing
+    }
+
+    /// The voxels in the type of their file, x fastest, then y, then z.
+    pub fn voxels(&self) -> &Voxels {
+        &self.parts.voxels
+    }
+
+    /// The type of a voxel.
+    pub fn voxel_type(&self) -> VoxelType {
+        self.parts.voxels.voxel_type()
+    }
+
+    /// Bytes of all voxels.
+    pub fn bytes(&self) -> u64 {
+        self.parts.voxels.as_bytes().len() as u64
+    }
+
+    /// value = raw · slope + inter.
+    pub fn slope(&self) -> f64 {
+        self.parts.slope
+    }
+
+    /// value = raw · slope + inter.
+    pub fn inter(&self) -> f64 {
+        self.parts.inter
+    }
+
+    /// The value of voxel (x, y, z), scaled; NaN where there is none, or outside of the grid.
+    pub fn value(&self, x: usize, y: usize, z: usize) -> f64 {
+        let [nx, ny, nz] = self.parts.dims;
+        if x >= nx || y >= ny || z >= nz {
+            return f64::NAN;
+        }
+        let raw = f64::from(self.parts.voxels.get_f32(x + nx * (y + ny * z)));
+        raw * self.parts.slope + self.parts.inter
+    }
+
+    /// World from continuous index: the box `[0, n]` stands centred at the world's origin.
+    pub fn world_from_index(&self) -> DAffine3 {
+        self.world_from_index
+    }
+
+    /// Continuous index from world.
+    pub fn index_from_world(&self) -> DAffine3 {
+        self.world_from_index.inverse()
+    }
+
+    /// Half the size of the smallest world-aligned box around the volume; its centre is the origin.
+    pub fn world_half_size(&self) -> DVec3 {
+        let linear = self.world_from_index.matrix3;
+        let half = DVec3::from_array(self.parts.dims.map(|n| n as f64 / 2.0));
+        linear.x_axis.abs() * half.x + linear.y_axis.abs() * half.y + linear.z_axis.abs() * half.z
+    }
+
+    /// Least and greatest value, scaled; both 0 where no voxel is finite.
+    pub fn range(&self) -> [f64; 2] {
+        self.range
+    }
+
+    /// Voxels that are NaN, or were infinite in the file. Nothing is rendered where they are.
+    pub fn non_finite(&self) -> u64 {
+        self.non_finite
+    }
+
+    /// How many voxels have which value.
+    pub fn histogram(&self) -> &Histogram {
+        &self.histogram
+    }
+
+    /// Least and greatest value of each block of 8³ voxels.
+    pub fn cells(&self) -> &Cells {
+        &self.cells
+    }
+
+    /// A name for people.
+    pub fn name(&self) -> &str {
+        &self.parts.name
+    }
+
+    /// Where it came from: `nifti`, `nrrd`, `raw`, `builtin` or `field`.
+    pub fn format(&self) -> &str {
+        &self.parts.format
+    }
+
+    /// Row-major map from integer voxel indices to patient space (RAS), in the file's own length unit.
+    pub fn file_affine(&self) -> Option<[[f64; 4]; 4]> {
+        self.parts.file_affine
+    }
+
+    /// The world's length unit: `mm` or `unit`.
+    pub fn unit(&self) -> &str {
+        &self.parts.unit
+    }
+
+    /// What was lost or assumed while reading.
+    pub fn notes(&self) -> &[String] {
+        &self.parts.notes
+    }
+}
+
+/// The lengths of the columns, if they are usable as axes of a grid: finite, of sane length, and linearly independent.
+pub(crate) fn checked_axes(linear: DMat3, pointer: &str) -> Result<[f64; 3]> {
+    let lengths = [linear.x_axis.length(), linear.y_axis.length(), linear.z_axis.length()];
+    if !lengths.iter().all(|length| SPACING_RANGE.contains(length)) {
+        let detail = format!("the steps from voxel to voxel have the lengths {lengths:?}");
+        return Err(Error::invalid(pointer, detail, "finite, 1e-9 to 1e9"));
+    }
+    // The volume spanned by the unit axes: 1 for a right-angled grid, 0 where the axes lie in a plane.
+    let independence = linear.determinant().abs() / (lengths[0] * lengths[1] * lengths[2]);
+    if independence.is_nan() || independence < 1e-6 {
+        return Err(Error::invalid(pointer, "the axes of the grid lie in one plane", "three independent axes"));
+    }
+    Ok(lengths)
+}
+
+/// The scaled range; refused where a value would leave what 32-bit floats on the device can hold.
+fn physical_range(raw: [f64; 2], slope: f64, inter: f64) -> Result<[f64; 2]> {
+    let ends = raw.map(|value| value * slope + inter);
+    if ends.iter().any(|end| !(*end as f32).is_finite()) {
+        let detail = format!("the scaled values reach {:e} and {:e}", ends[0], ends[1]);
+        return Err(Error::invalid("header:scl_slope", detail, "within ±3.4e38"));
+    }
+    Ok([ends[0].min(ends[1]), ends[0].max(ends[1])])
+}

@@ -1,0 +1,166 @@
+//! The store's folder: for each upload the body as it came and a JSON record, which is written last.
+//!
+//! Every file is written under a temporary name, flushed and renamed. A crash leaves at worst a body without a
+//! record or a temporary file; both are removed at the next start.
+
+use super::{RawParams, VolumeInfo};
+use crate::error::{Error, Result};
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// Hexadecimal digits of an id.
+const ID_DIGITS: usize = 32;
+
+/// Begins the names of files that are being written.
+const TEMPORARY: &str = "tmp-";
+
+/// What stands beside an upload in `ID.json`.
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
+pub(super) struct Record {
+    /// What is told of it in lists.
+    pub info: VolumeInfo,
+    /// How its voxels are to be read, if it does not say itself.
+    pub raw: Option<RawParams>,
+    /// Extension of the uploaded file.
+    pub extension: Extension,
+    /// Bytes of the uploaded file.
+    pub file_bytes: u64,
+    /// Seconds since 1970.
+    pub created_unix_s: u64,
+}
+
+/// Extension of a stored upload, after its content.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub(super) enum Extension {
+    #[serde(rename = "nii")]
+    Nii,
+    #[serde(rename = "nii.gz")]
+    NiiGz,
+    #[serde(rename = "nrrd")]
+    Nrrd,
+    #[serde(rename = "raw")]
+    Raw,
+}
+
+impl Extension {
+    fn text(self) -> &'static str {
+        match self {
+            Self::Nii => "nii",
+            Self::NiiGz => "nii.gz",
+            Self::Nrrd => "nrrd",
+            Self::Raw => "raw",
+        }
+    }
+}
+
+/// Whether the text is an id as this store makes them; nothing else ever becomes part of a path.
+pub(super) fn is_id(text: &str) -> bool {
+    text.len() == ID_DIGITS && text.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
+}
+
+/// The id of a body: its hash, and that of how it is to be read.
+pub(super) fn id_of(bytes: &[u8], raw: Option<&RawParams>) -> Result<String> {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(bytes);
+    if let Some(raw) = raw {
+        hasher.update(&serde_json::to_vec(raw).map_err(Error::internal)?);
+    }
+    Ok(hasher.finalize().to_hex().chars().take(ID_DIGITS).collect())
+}
+
+/// The folder of a store.
+pub(super) struct Folder(PathBuf);
+
+impl Folder {
+    /// Opens or creates the folder, removes what a crash has left, and reads the records.
+    pub fn open(dir: &Path) -> Result<(Self, Vec<(String, Record)>)> {
+        fs::create_dir_all(dir).map_err(|cause| failed("create the folder for volumes", &cause))?;
+        let folder = Self(dir.to_owned());
+        let names = folder.names()?;
+        let mut records = Vec::new();
+        for id in names.iter().filter_map(|name| name.strip_suffix(".json")).filter(|id| is_id(id)) {
+            match folder.read_record(id) {
+                Ok(record) => records.push((id.to_owned(), record)),
+                Err(cause) => tracing::warn!(id, %cause, "a stored volume cannot be used"),
+            }
+        }
+        for name in &names {
+            // A body whose record cannot be read stays: another version of this program may know how.
+            let left_over = name.split_once('.').is_some_and(|(id, extension)| {
+                is_id(id) && extension != "json" && !names.contains(&format!("{id}.json"))
+            });
+            if left_over || name.starts_with(TEMPORARY) {
+                tracing::info!(name, "removing what an interrupted upload has left");
+                folder.remove_file(name)?;
+            }
+        }
+        Ok((folder, records))
+    }
+
+    fn names(&self) -> Result<Vec<String>> {
+        let entries = fs::read_dir(&self.0).map_err(|cause| failed("list the stored volumes", &cause))?;
+        let names = entries.map(|entry| entry.map(|entry| entry.file_name().into_string()));
+        let names: Result<Vec<_>, _> = names.collect::<io::Result<_>>();
+        let names = names.map_err(|cause| failed("list the stored volumes", &cause))?;
+        Ok(names.into_iter().filter_map(Result::ok).collect())
+    }
+
+    fn read_record(&self, id: &str) -> Result<Record> {
+        let text = fs::read(self.0.join(format!("{id}.json"))).map_err(|cause| failed("read a record", &cause))?;
+        let record: Record = serde_json::from_slice(&text).map_err(Error::internal)?;
+        let body = fs::metadata(self.body_path(id, &record)).map_err(|cause| failed("find a body", &cause))?;
+        if body.len() != record.file_bytes || record.info.id.as_deref() != Some(id) {
+            return Err(Error::internal("the record does not agree with its body"));
+        }
+        Ok(record)
+    }
+
+    fn body_path(&self, id: &str, record: &Record) -> PathBuf {
+        self.0.join(format!("{id}.{}", record.extension.text()))
+    }
+
+    /// Writes an upload: the body first, then the record that makes it count.
+    pub fn write(&self, id: &str, bytes: &[u8], record: &Record) -> Result<()> {
+        let text = serde_json::to_vec_pretty(record).map_err(Error::internal)?;
+        self.write_file(&self.body_path(id, record), id, bytes)
+            .and_then(|()| self.write_file(&self.0.join(format!("{id}.json")), id, &text))
+            .map_err(|cause| failed("store a volume", &cause))
+    }
+
+    fn write_file(&self, path: &Path, id: &str, bytes: &[u8]) -> io::Result<()> {
+        let temporary = self.0.join(format!("{TEMPORARY}{id}"));
+        let written = File::create(&temporary).and_then(|mut file| {
+            file.write_all(bytes)?;
+            file.sync_all()
+        });
+        let renamed = written.and_then(|()| fs::rename(&temporary, path));
+        if renamed.is_err() {
+            // A full disk is the likely cause: give back what was taken.
+            let _ = fs::remove_file(&temporary);
+        }
+        renamed
+    }
+
+    /// The body of an upload.
+    pub fn read(&self, id: &str, record: &Record) -> Result<Vec<u8>> {
+        fs::read(self.body_path(id, record)).map_err(|cause| failed("read a stored volume", &cause))
+    }
+
+    /// Removes an upload: the record first, so that no record is without its body.
+    pub fn remove(&self, id: &str, record: &Record) -> Result<()> {
+        self.remove_file(&format!("{id}.json"))?;
+        self.remove_file(&format!("{id}.{}", record.extension.text()))
+    }
+
+    fn remove_file(&self, name: &str) -> Result<()> {
+        match fs::remove_file(self.0.join(name)) {
+            Err(cause) if cause.kind() != io::ErrorKind::NotFound => Err(failed("remove a stored volume", &cause)),
+            _ => Ok(()),
+        }
+    }
+}
+
+fn failed(what: &str, cause: &io::Error) -> Error {
+    Error::internal(format!("cannot {what}: {cause}"))
+}
