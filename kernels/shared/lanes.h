@@ -1,0 +1,108 @@
+// Lanes: the same kernel text runs on packets of LANES rays or photons (PoCL on a CPU does not vectorise divergent
+// loops, so the packet is written out in vector types) and on single ones (LANES 1, the fast form on a GPU).
+//   Real, Int, UInt   one float, int, uint a lane
+//   Mask              an Int that is -1 (yes) or 0 (no) a lane; made by MASK(a < b), joined by & | ~
+//   Real3             three Reals; lane types have no vector form of their own
+// select(no, yes, mask), any(mask), all(mask) are OpenCL's own and mean the same for LANES 1 and more.
+
+#if LANES == 1
+#define LANES_SUFFIX
+#define MASK(comparison) (-(comparison))
+#elif LANES == 4 || LANES == 8 || LANES == 16
+#define LANES_SUFFIX LANES
+#define MASK(comparison) (comparison)
+#else
+#error "LANES is 1, 4, 8 or 16"
+#endif
+
+#define JOIN_(a, b) a##b
+#define JOIN(a, b) JOIN_(a, b)
+typedef JOIN(float, LANES_SUFFIX) Real;
+typedef JOIN(int, LANES_SUFFIX) Int;
+typedef JOIN(uint, LANES_SUFFIX) UInt;
+typedef JOIN(ulong, LANES_SUFFIX) ULong;
+typedef Int Mask;
+typedef struct { Real x, y, z; } Real3;
+
+#define to_real(v) JOIN(convert_float, LANES_SUFFIX)(v)
+#define to_int(v) JOIN(convert_int, LANES_SUFFIX)(v)
+#define to_uint(v) JOIN(convert_uint, LANES_SUFFIX)(v)
+#define to_ulong(v) JOIN(convert_ulong, LANES_SUFFIX)(v)
+#define as_Int(v) JOIN(as_int, LANES_SUFFIX)(v)
+#define as_UInt(v) JOIN(as_uint, LANES_SUFFIX)(v)
+#define as_Real(v) JOIN(as_float, LANES_SUFFIX)(v)
+
+// A tile of pixels is a packet: neighbours diverge least.
+#define TILE_W (LANES == 16 ? 4 : LANES == 8 ? 4 : LANES == 4 ? 2 : 1)
+#define TILE_H (LANES / TILE_W)
+
+#if LANES == 1
+#define LANE_IDS 0
+#elif LANES == 4
+#define LANE_IDS ((Int)(0, 1, 2, 3))
+#elif LANES == 8
+#define LANE_IDS ((Int)(0, 1, 2, 3, 4, 5, 6, 7))
+#else
+#define LANE_IDS ((Int)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15))
+#endif
+
+// The address of a lane's element when a vector has to be taken apart (scatter, atomics).
+typedef union { Real v; float lane[LANES]; } RealLanes;
+typedef union { Int v; int lane[LANES]; } IntLanes;
+
+// gather_words(base, byte_offset): 32 bits from base + byte_offset, unaligned, a lane.
+// One AVX-512 or AVX2 instruction where clang has it; plain loads elsewhere. The buffer is padded by 8 bytes.
+#if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_gathersiv16si)
+static inline Int gather_words(global const uchar *base, Int byte_offset) {
+    return __builtin_ia32_gathersiv16si((Int)(0), (const void *)(size_t)base, byte_offset, (short)-1, 1);
+}
+#elif LANES == 8 && defined(__AVX2__) && __has_builtin(__builtin_ia32_gatherd_d256)
+static inline Int gather_words(global const uchar *base, Int byte_offset) {
+    return __builtin_ia32_gatherd_d256((Int)(0), (const int *)(size_t)base, byte_offset, (Int)(-1), 1);
+}
+#else
+static inline int load_word(global const uchar *address) {
+    uchar4 bytes = vload4(0, address);
+    return as_int(bytes);
+}
+#if LANES == 1
+static inline Int gather_words(global const uchar *base, Int byte_offset) { return load_word(base + byte_offset); }
+#else
+static inline Int gather_words(global const uchar *base, Int byte_offset) {
+    IntLanes offset, word;
+    offset.v = byte_offset;
+    for (int i = 0; i < LANES; i++) word.lane[i] = load_word(base + offset.lane[i]);
+    return word.v;
+}
+#endif
+#endif
+
+static inline Int gather_ints(global const int *base, Int index) {
+#if LANES == 1
+    return base[index];
+#elif LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_gathersiv16si)
+    return __builtin_ia32_gathersiv16si((Int)(0), (const void *)(size_t)base, index, (short)-1, 4);
+#elif LANES == 8 && defined(__AVX2__) && __has_builtin(__builtin_ia32_gatherd_d256)
+    return __builtin_ia32_gatherd_d256((Int)(0), (const int *)(size_t)base, index, (Int)(-1), 4);
+#else
+    IntLanes from, value;
+    from.v = index;
+    for (int i = 0; i < LANES; i++) value.lane[i] = base[from.lane[i]];
+    return value.v;
+#endif
+}
+
+static inline Real gather_reals(global const float *base, Int index) {
+    return as_Real(gather_ints((global const int *)base, index));
+}
+
+static inline Real3 real3(Real x, Real y, Real z) { Real3 r; r.x = x; r.y = y; r.z = z; return r; }
+static inline Real3 add3(Real3 a, Real3 b) { return real3(a.x + b.x, a.y + b.y, a.z + b.z); }
+static inline Real3 scale3(Real3 a, Real s) { return real3(a.x * s, a.y * s, a.z * s); }
+static inline Real3 along(Real3 origin, Real3 direction, Real t) {
+    return real3(mad(direction.x, t, origin.x), mad(direction.y, t, origin.y), mad(direction.z, t, origin.z));
+}
+static inline Real dot3(Real3 a, Real3 b) { return mad(a.x, b.x, mad(a.y, b.y, a.z * b.z)); }
+static inline Real3 select3(Real3 no, Real3 yes, Mask m) {
+    return real3(select(no.x, yes.x, m), select(no.y, yes.y, m), select(no.z, yes.z, m));
+}

@@ -1,0 +1,25 @@
+// Counter-based random numbers: Philox4x32-10 (Salmon, Moraes, Dror, Shaw: "Parallel Random Numbers: As Easy as
+// 1, 2, 3", SC'11). A number is a pure function of (seed; index, sample, dimension), so a result does not depend on
+// the number of threads, the slices or the load.
+
+typedef struct { UInt a, b, c, d; } UInt4Lanes;
+
+static inline UInt high_product(UInt x, uint m) { return to_uint((to_ulong(x) * (ulong)m) >> 32); }
+
+// ctr = (index, sample, dimension, stream), key = seed.
+static inline UInt4Lanes philox(UInt4Lanes ctr, uint key0, uint key1) {
+    for (int round = 0; round < 10; round++) {
+        UInt hi0 = high_product(ctr.a, 0xD2511F53u), lo0 = ctr.a * 0xD2511F53u;
+        UInt hi1 = high_product(ctr.c, 0xCD9E8D57u), lo1 = ctr.c * 0xCD9E8D57u;
+        ctr.a = hi1 ^ ctr.b ^ key0;
+        ctr.b = lo1;
+        ctr.c = hi0 ^ ctr.d ^ key1;
+        ctr.d = lo0;
+        key0 += 0x9E3779B9u;
+        key1 += 0xBB67AE85u;
+    }
+    return ctr;
+}
+
+// Strictly inside (0, 1): 23 bits and a half, so that neither log(u) nor log(1 - u) is ever infinite.
+static inline Real unit_open(UInt bits) { return mad(to_real(bits >> 9), 1.1920928955078125e-7f, 5.9604644775390625e-8f); }
