@@ -1,0 +1,201 @@
+//! The only home of opencl3 and of `unsafe`: one context, its programs and buffers, and running a plan's calls.
+//!
+//! A [`Device`] lives on the thread that opened it (the job engine's), so that everything else stays free of OpenCL.
+
+pub mod program;
+mod select;
+pub mod structs;
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::ptr;
+use std::time::{Duration, Instant};
+
+use opencl3::command_queue::CommandQueue;
+use opencl3::context::Context;
+use opencl3::kernel::Kernel;
+use opencl3::memory::{Buffer as ClBuffer, CL_MEM_READ_WRITE, ClMem};
+use opencl3::program::Program;
+use opencl3::types::{CL_BLOCKING, cl_mem, cl_uchar};
+
+pub use select::{DeviceInfo, list, select};
+
+use crate::error::{Error, Result};
+use program::{Source, Variant};
+
+/// How a device is chosen and where its compiled kernels are kept.
+#[derive(Debug, Clone)]
+pub struct DeviceConfig {
+    /// `pocl`, `gpu`, or part of a platform's or device's name.
+    pub wish: String,
+    /// Overrides the lanes (1, 4, 8 or 16).
+    pub lanes: Option<u32>,
+    /// Kernel files are read from here instead of the binary.
+    pub kernels: Option<PathBuf>,
+}
+
+/// Bytes on the device.
+pub struct Buffer {
+    memory: ClBuffer<cl_uchar>,
+    bytes: usize,
+}
+
+impl Buffer {
+    /// Its size in bytes.
+    pub fn len(&self) -> usize {
+        self.bytes
+    }
+
+    /// Whether it has no bytes: never, since OpenCL permits no empty buffer.
+    pub fn is_empty(&self) -> bool {
+        self.bytes == 0
+    }
+}
+
+/// The device: one OpenCL context, its queue, and the kernels built so far.
+pub struct Device {
+    info: DeviceInfo,
+    context: Context,
+    queue: CommandQueue,
+    id: opencl3::types::cl_device_id,
+    kernels: HashMap<Variant, Kernel>,
+    overrides: Option<PathBuf>,
+}
+
+fn cl<T>(doing: &str, result: std::result::Result<T, opencl3::error_codes::ClError>) -> Result<T> {
+    result.map_err(|e| Error::internal(format!("OpenCL, {doing}: {e}")))
+}
+
+/// Points PoCL's compiled-kernel cache at `cache`, unless the environment names one already.
+/// Call before any thread is started and before OpenCL is first used.
+///
+/// # Errors
+/// [`Error::Internal`] when the folder cannot be made.
+pub fn keep_compiled_kernels_in(cache: &Path) -> Result<()> {
+    std::fs::create_dir_all(cache).map_err(|e| Error::internal(format!("kernel cache {}: {e}", cache.display())))?;
+    if std::env::var_os("POCL_CACHE_DIR").is_none() {
+        // SAFETY: called from main before any other thread exists, so nobody reads the environment at the same time.
+        unsafe { std::env::set_var("POCL_CACHE_DIR", cache) };
+    }
+    Ok(())
+}
+
+impl Device {
+    /// Opens the device that `config` wishes for.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] when there is none or OpenCL fails.
+    pub fn open(config: &DeviceConfig) -> Result<Self> {
+        let (device, info) = select(&config.wish, config.lanes)?;
+        let context = cl("creating the context", Context::from_device(&device))?;
+        // The 1.x form: PoCL 3.1 and NVIDIA's OpenCL both have it.
+        let queue = cl("creating the queue", CommandQueue::create_default(&context, 0))?;
+        Ok(Self { info, id: device.id(), context, queue, kernels: HashMap::new(), overrides: config.kernels.clone() })
+    }
+
+    /// What the device says of itself.
+    pub fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    /// Builds a variant unless it is there already. PoCL compiles for real at the first launch, so a caller that wants it
+    /// warm launches it once.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] with the build log.
+    pub fn build(&mut self, source: &Source, variant: &Variant) -> Result<()> {
+        if self.kernels.contains_key(variant) {
+            return Ok(());
+        }
+        let text = source.text(self.overrides.as_deref())?;
+        let mut program = cl("creating a program", Program::create_from_source(&self.context, &text))?;
+        if let Err(code) = program.build(&[self.id], &variant.options(self.info.lanes)) {
+            let log = program.get_build_log(self.id).unwrap_or_default();
+            return Err(Error::internal(format!("building {}: {code}\n{log}", variant.label())));
+        }
+        let kernel = cl("creating a kernel", Kernel::create(&program, variant.kernel))?;
+        self.kernels.insert(*variant, kernel);
+        Ok(())
+    }
+
+    /// A buffer of `bytes` bytes (at least 1), not yet written.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] when the device has no room.
+    pub fn allocate(&self, bytes: usize) -> Result<Buffer> {
+        let bytes = bytes.max(1);
+        // SAFETY: no host pointer is given, so there is no memory of ours whose validity matters.
+        let memory = unsafe { ClBuffer::create(&self.context, CL_MEM_READ_WRITE, bytes, ptr::null_mut()) };
+        Ok(Buffer { memory: cl("allocating a buffer", memory)?, bytes })
+    }
+
+    /// A buffer that holds `data` and `padding` zero bytes behind it.
+    ///
+    /// # Errors
+    /// As [`Device::allocate`].
+    pub fn upload(&self, data: &[u8], padding: usize) -> Result<Buffer> {
+        let mut buffer = self.allocate(data.len() + padding)?;
+        self.write(&mut buffer, 0, data)?;
+        self.write(&mut buffer, data.len(), &vec![0; padding])?;
+        Ok(buffer)
+    }
+
+    /// Writes `data` at `offset`.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] when it does not fit or OpenCL fails.
+    pub fn write(&self, buffer: &mut Buffer, offset: usize, data: &[u8]) -> Result<()> {
+        if data.is_empty() {
+            return Ok(());
+        }
+        if offset + data.len() > buffer.bytes {
+            return Err(Error::internal("a write past the end of a device buffer"));
+        }
+        // SAFETY: the range was checked above, and the call blocks until `data` has been read.
+        let event = unsafe { self.queue.enqueue_write_buffer(&mut buffer.memory, CL_BLOCKING, offset, data, &[]) };
+        cl("writing a buffer", event).map(drop)
+    }
+
+    /// Reads from `offset` until `out` is full.
+    ///
+    /// # Errors
+    /// As [`Device::write`].
+    pub fn read<T: bytemuck::Pod>(&self, buffer: &Buffer, offset: usize, out: &mut [T]) -> Result<()> {
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(out);
+        if bytes.is_empty() {
+            return Ok(());
+        }
+        if offset + bytes.len() > buffer.bytes {
+            return Err(Error::internal("a read past the end of a device buffer"));
+        }
+        // SAFETY: the range was checked above, `bytes` is plain data, and the call blocks until it is filled.
+        let event = unsafe { self.queue.enqueue_read_buffer(&buffer.memory, CL_BLOCKING, offset, bytes, &[]) };
+        cl("reading a buffer", event).map(drop)
+    }
+
+    /// Runs `items` work-items of a built variant from number `first` on, waits, and says how long the device took.
+    /// `arguments` are the kernel's buffers in order; the kernel itself keeps within them and returns at once for items past
+    /// its work, since the count is rounded up to whole work-groups.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] when the variant is not built or OpenCL fails.
+    pub fn run(&self, variant: &Variant, arguments: &[&Buffer], first: usize, items: usize) -> Result<Duration> {
+        let kernel =
+            self.kernels.get(variant).ok_or_else(|| Error::internal(format!("{} is not built", variant.label())))?;
+        for (index, buffer) in arguments.iter().enumerate() {
+            let memory: cl_mem = buffer.memory.get();
+            // SAFETY: every kernel argument here is a buffer, and a cl_mem of this context is what clSetKernelArg takes for one.
+            cl("setting an argument", unsafe { kernel.set_arg(index as u32, &memory) })?;
+        }
+        let local = self.info.local_size;
+        let (offset, global) = ([first], [items.div_ceil(local) * local]);
+        let started = Instant::now();
+        // SAFETY: the pointers are to arrays of one element for one work dimension, alive through the call; the arguments are set.
+        let event = unsafe {
+            self.queue.enqueue_nd_range_kernel(kernel.get(), 1, offset.as_ptr(), global.as_ptr(), [local].as_ptr(), &[])
+        };
+        cl("launching a kernel", event)?;
+        cl("waiting for the device", self.queue.finish())?;
+        Ok(started.elapsed())
+    }
+}

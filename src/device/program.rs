@@ -1,0 +1,90 @@
+//! The kernels' text and the variants that may be built: all of them are listed, none is made up at run time.
+
+use include_dir::{Dir, include_dir};
+use std::path::Path;
+
+use crate::error::{Error, Result};
+use crate::volume::VoxelType;
+
+static KERNELS: Dir = include_dir!("$CARGO_MANIFEST_DIR/kernels");
+
+/// One permitted build of one kernel file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Variant {
+    /// The technique: the file `kernels/<name>.cl` and the kernel function in it.
+    pub kernel: &'static str,
+    /// The volume's voxel type, where the kernel reads a volume.
+    pub voxel: Option<VoxelType>,
+    /// Features compiled in, `-D NAME=VALUE`.
+    pub features: &'static [(&'static str, i32)],
+}
+
+/// What a technique gives to build its kernel from, besides the file itself.
+#[derive(Debug, Clone)]
+pub struct Source {
+    /// The kernel file's name, without `.cl`.
+    pub kernel: &'static str,
+    /// Shared headers in order, such as `shared/lanes.h`.
+    pub headers: &'static [&'static str],
+    /// The OpenCL C text of its device structs.
+    pub structs: fn() -> String,
+    /// How many buffers the kernel takes.
+    pub arguments: usize,
+    /// Every variant that may be built.
+    pub variants: fn() -> Vec<Variant>,
+}
+
+fn read(overrides: Option<&Path>, name: &str) -> Result<String> {
+    if let Some(dir) = overrides {
+        return std::fs::read_to_string(dir.join(name))
+            .map_err(|e| Error::internal(format!("kernel file {name}: {e}")));
+    }
+    let file =
+        KERNELS.get_file(name).ok_or_else(|| Error::internal(format!("kernel file {name} is not in the binary")))?;
+    file.contents_utf8().map(str::to_owned).ok_or_else(|| Error::internal(format!("kernel file {name} is not UTF-8")))
+}
+
+impl Source {
+    /// The whole text in one string: opencl3 crashes on several, so each part starts with a `#line` of its own.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] when a file is missing.
+    pub fn text(&self, overrides: Option<&Path>) -> Result<String> {
+        let mut text = format!("#line 1 \"structs\"\n{}", (self.structs)());
+        let main = format!("{}.cl", self.kernel);
+        for name in self.headers.iter().copied().chain([main.as_str()]) {
+            text += &format!("#line 1 \"kernels/{name}\"\n{}\n", read(overrides, name)?);
+        }
+        Ok(text)
+    }
+}
+
+impl Variant {
+    /// The build options. Not `-cl-fast-relaxed-math`: it would let the compiler assume that no NaN occurs.
+    pub fn options(&self, lanes: u32) -> String {
+        let mut options = format!("-cl-std=CL1.2 -Werror -cl-mad-enable -cl-no-signed-zeros -DLANES={lanes}");
+        for (name, code) in [("VOXEL_U8", 0), ("VOXEL_I16", 1), ("VOXEL_U16", 2), ("VOXEL_F32", 3)] {
+            options += &format!(" -D{name}={code}");
+        }
+        if let Some(voxel) = self.voxel {
+            let code = match voxel {
+                VoxelType::U8 => 0,
+                VoxelType::I16 => 1,
+                VoxelType::U16 => 2,
+                VoxelType::F32 => 3,
+            };
+            options += &format!(" -DVOXEL={code}");
+        }
+        for (name, value) in self.features {
+            options += &format!(" -D{name}={value}");
+        }
+        options
+    }
+
+    /// A name for logs, such as `emission_absorption u8 SHADED=1`.
+    pub fn label(&self) -> String {
+        let voxel = self.voxel.map(|v| format!(" {v:?}").to_lowercase()).unwrap_or_default();
+        let features: String = self.features.iter().map(|(n, v)| format!(" {n}={v}")).collect();
+        format!("{}{voxel}{features}", self.kernel)
+    }
+}

@@ -1,0 +1,145 @@
+//! Which OpenCL device is used, and what it says of itself.
+
+use opencl3::device::{CL_DEVICE_TYPE_ALL, CL_DEVICE_TYPE_CPU, CL_DEVICE_TYPE_GPU, Device as ClDevice};
+use opencl3::platform::{Platform, get_platforms};
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+
+/// What an OpenCL device says of itself, as `GET /v1/device` and `cloudchamber device` show it.
+#[derive(Debug, Clone, Serialize)]
+pub struct DeviceInfo {
+    /// The OpenCL platform, such as `Portable Computing Language`.
+    pub platform: String,
+    /// The platform's version text.
+    pub platform_version: String,
+    /// The device's name.
+    pub device: String,
+    /// `cpu`, `gpu` or `other`.
+    pub kind: &'static str,
+    /// The OpenCL version that the device supports.
+    pub version: String,
+    /// The driver's version.
+    pub driver: String,
+    /// Compute units (cores).
+    pub compute_units: u32,
+    /// Clock in MHz, as the driver states it.
+    pub clock_mhz: u32,
+    /// Device memory in bytes.
+    pub global_memory_bytes: u64,
+    /// The largest single buffer in bytes.
+    pub largest_buffer_bytes: u64,
+    /// Local memory of a work-group in bytes.
+    pub local_memory_bytes: u64,
+    /// The largest work-group.
+    pub largest_work_group: usize,
+    /// Floats that the device likes in a vector: what the lanes are chosen by.
+    pub native_vector_width_float: u32,
+    /// Whether images (textures) are supported.
+    pub image_support: bool,
+    /// The largest 3D image, voxels a side.
+    pub largest_image_3d: [usize; 3],
+    /// Whether 64-bit integer atomics are there (photon transport needs them).
+    pub int64_atomics: bool,
+    /// Rays or photons that one work-item carries here.
+    pub lanes: u32,
+    /// Work-items in a work-group here.
+    pub local_size: usize,
+}
+
+fn cl<T>(result: std::result::Result<T, opencl3::error_codes::ClError>) -> Result<T> {
+    result.map_err(|e| Error::internal(format!("OpenCL: {e}")))
+}
+
+/// The lanes for a device: its own vector width on a CPU, 1 on anything else. `forced` (4, 8, 16 or 1) wins.
+fn lanes_for(kind: &str, width: u32, forced: Option<u32>) -> u32 {
+    forced.unwrap_or(match (kind, width) {
+        ("cpu", 16..) => 16,
+        ("cpu", 8..=15) => 8,
+        ("cpu", 4..=7) => 4,
+        _ => 1,
+    })
+}
+
+fn describe(platform: &Platform, device: &ClDevice, forced_lanes: Option<u32>) -> Result<DeviceInfo> {
+    let bits = cl(device.dev_type())?;
+    let kind = match bits {
+        t if t & CL_DEVICE_TYPE_CPU != 0 => "cpu",
+        t if t & CL_DEVICE_TYPE_GPU != 0 => "gpu",
+        _ => "other",
+    };
+    let width = cl(device.native_vector_width_float())?;
+    let image_support = cl(device.image_support())?;
+    let lanes = lanes_for(kind, width, forced_lanes);
+    Ok(DeviceInfo {
+        platform: cl(platform.name())?,
+        platform_version: cl(platform.version())?,
+        device: cl(device.name())?.trim().to_owned(),
+        kind,
+        version: cl(device.version())?,
+        driver: cl(device.driver_version())?,
+        compute_units: cl(device.max_compute_units())?,
+        clock_mhz: cl(device.max_clock_frequency())?,
+        global_memory_bytes: cl(device.global_mem_size())?,
+        largest_buffer_bytes: cl(device.max_mem_alloc_size())?,
+        local_memory_bytes: cl(device.local_mem_size())?,
+        largest_work_group: cl(device.max_work_group_size())?,
+        native_vector_width_float: width,
+        image_support,
+        largest_image_3d: if image_support {
+            [cl(device.image3d_max_width())?, cl(device.image3d_max_height())?, cl(device.image3d_max_depth())?]
+        } else {
+            [0; 3]
+        },
+        int64_atomics: cl(device.extensions())?.contains("cl_khr_int64_base_atomics"),
+        lanes,
+        // A CPU work-item is already a packet, so a group is only the unit that threads share out; a GPU wants whole warps.
+        local_size: if kind == "gpu" { 64 } else { 16 },
+    })
+}
+
+/// Every OpenCL device here, with its description.
+///
+/// # Errors
+/// [`Error::Internal`] when there is no OpenCL at all, with how to install it.
+pub fn list(forced_lanes: Option<u32>) -> Result<Vec<(ClDevice, DeviceInfo)>> {
+    let missing = "no OpenCL platform found: install PoCL (Debian: pocl-opencl-icd and ocl-icd-libopencl1)";
+    // The ICD loader is opened at run time: without it, cl3 panics in its lazy initialiser instead of returning an error.
+    let platforms = std::panic::catch_unwind(get_platforms)
+        .map_err(|_| Error::internal(missing))?
+        .map_err(|e| Error::internal(format!("{missing} ({e})")))?;
+    let mut found = Vec::new();
+    for platform in platforms {
+        for id in platform.get_devices(CL_DEVICE_TYPE_ALL).unwrap_or_default() {
+            let device = ClDevice::new(id);
+            let info = describe(&platform, &device, forced_lanes)?;
+            found.push((device, info));
+        }
+    }
+    if found.is_empty() { Err(Error::internal(missing)) } else { Ok(found) }
+}
+
+/// The device for a wish: `pocl` (or `cpu`) the first CPU, PoCL's before others; `gpu` the first GPU; else the first whose
+/// platform or name contains the wish, in any case.
+///
+/// # Errors
+/// [`Error::Internal`] when none fits; the message lists what there is.
+pub fn select(wish: &str, forced_lanes: Option<u32>) -> Result<(ClDevice, DeviceInfo)> {
+    let devices = list(forced_lanes)?;
+    let names: Vec<String> = devices.iter().map(|(_, i)| format!("{} / {}", i.platform, i.device)).collect();
+    let lower = wish.to_lowercase();
+    let is_pocl = |i: &DeviceInfo| i.platform.contains("Portable Computing Language");
+    let rank = |i: &DeviceInfo| match lower.as_str() {
+        "pocl" | "cpu" | "" => (i.kind == "cpu").then_some(if is_pocl(i) { 0 } else { 1 }),
+        "gpu" => (i.kind == "gpu").then_some(0),
+        text => (i.platform.to_lowercase().contains(text) || i.device.to_lowercase().contains(text)).then_some(0),
+    };
+    devices
+        .into_iter()
+        .filter_map(|(d, i)| rank(&i).map(|r| (r, d, i)))
+        .min_by_key(|(r, _, _)| *r)
+        .map(|(_, d, i)| (d, i))
+        .ok_or_else(|| {
+            Error::internal(format!("no OpenCL device fits --device {wish}; there are: {}", names.join(", ")))
+        })
+}

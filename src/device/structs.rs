@@ -1,0 +1,104 @@
+//! Parameters are declared once: [`device_struct!`](crate::device_struct) makes the Rust struct, its OpenCL C text and its
+//! offsets from one declaration. Only 4-byte scalars and arrays of them: OpenCL promises nothing about how `float3` lies in
+//! a struct that the host and the device share.
+
+/// A type that may stand in a device struct.
+pub trait DeviceField {
+    /// Its OpenCL C declaration, given the field's name.
+    fn declare(name: &str) -> String;
+}
+
+macro_rules! scalar {
+    ($rust:ty, $opencl:literal) => {
+        impl DeviceField for $rust {
+            fn declare(name: &str) -> String {
+                format!(concat!($opencl, " {};"), name)
+            }
+        }
+        impl<const N: usize> DeviceField for [$rust; N] {
+            fn declare(name: &str) -> String {
+                format!(concat!($opencl, " {}[{}];"), name, N)
+            }
+        }
+    };
+}
+scalar!(f32, "float");
+scalar!(i32, "int");
+scalar!(u32, "uint");
+
+/// What a device struct can tell of itself.
+pub trait DeviceStruct: bytemuck::Pod {
+    /// Its name in Rust and in OpenCL C.
+    const NAME: &'static str;
+    /// The name and byte offset of every field, in order.
+    fn offsets() -> Vec<(&'static str, usize)>;
+    /// The OpenCL C `typedef`.
+    fn opencl_text() -> String;
+}
+
+/// Declares a struct for host and device: `device_struct! { /// words pub struct Name { field: [f32; 3], … } }`.
+#[macro_export]
+macro_rules! device_struct {
+    ($(#[$meta:meta])* pub struct $name:ident { $($(#[$field_meta:meta])* pub $field:ident: $type:ty,)* }) => {
+        $(#[$meta])*
+        #[repr(C)]
+        #[derive(Debug, Clone, Copy, PartialEq, Default, bytemuck::Pod, bytemuck::Zeroable)]
+        pub struct $name { $($(#[$field_meta])* pub $field: $type,)* }
+
+        impl $crate::device::structs::DeviceStruct for $name {
+            const NAME: &'static str = stringify!($name);
+            fn offsets() -> Vec<(&'static str, usize)> {
+                vec![$((stringify!($field), std::mem::offset_of!($name, $field)),)*]
+            }
+            fn opencl_text() -> String {
+                let mut text = String::from("typedef struct {\n");
+                $(text += &format!("    {}\n", <$type as $crate::device::structs::DeviceField>::declare(stringify!($field)));)*
+                text + "} " + stringify!($name) + ";\n"
+            }
+        }
+    };
+}
+
+device_struct! {
+    /// What every view kernel is told of the camera, the image and the pass. See `kernels/shared/camera.h`.
+    pub struct View {
+        /// The image's (0, 0) corner on the plane near the volume, index units.
+        pub plane: [f32; 3],
+        /// One pixel to the right on that plane, index units.
+        pub right: [f32; 3],
+        /// One pixel down on that plane, index units.
+        pub down: [f32; 3],
+        /// From the eye to `plane`, index units (orthographic: the view direction).
+        pub towards: [f32; 3],
+        /// The same in world units.
+        pub towards_world: [f32; 3],
+        /// One pixel to the right, world units.
+        pub right_world: [f32; 3],
+        /// One pixel down, world units.
+        pub down_world: [f32; 3],
+        /// Distance from the eye to the plane, world units (orthographic only).
+        pub t_eye: f32,
+        /// -1 for perspective, 0 for orthographic: a lane mask.
+        pub perspective: i32,
+        /// Voxels along x, y, z.
+        pub dims: [i32; 3],
+        /// Width of this pass in its own pixels.
+        pub width: i32,
+        /// Height of this pass in its own pixels.
+        pub height: i32,
+        /// Width of the full image: numbers the pixels for the random numbers.
+        pub full_width: i32,
+        /// This pass renders every `stride`-th pixel of the full image.
+        pub stride: i32,
+        /// Number of the sample in its film, from 0.
+        pub sample: i32,
+        /// Which film: keeps the random numbers of the films apart.
+        pub stream: u32,
+        /// The request's seed.
+        pub seed: [u32; 2],
+        /// Where in a pixel the ray goes through, in full-size pixels.
+        pub offset: [f32; 2],
+        /// The step along the ray, world units.
+        pub step: f32,
+    }
+}
