@@ -1,0 +1,193 @@
+//! Wire types: what a client may send, as JSON Schema and serde see it. No defaults are resolved here and nothing is read.
+//!
+//! A body is checked against the very schema that is served (`schema`), so what the documentation permits and what the
+//! server permits cannot drift apart; what a schema cannot say is checked when the [`crate::scene`] is made.
+
+use jsonschema::error::{TypeKind, ValidationErrorKind};
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value, json};
+
+use crate::error::{Error, Result, Violation};
+
+/// The body of `POST /v1/renders`, less the techniques' own parameters.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+pub struct RenderRequest {
+    /// The view technique that makes the picture.
+    pub technique: String,
+    /// What is looked at: an uploaded volume, a built-in one, or a field technique's name with its parameters. Default: the built-in `smoke`.
+    pub volume: Option<VolumeRequest>,
+    /// Default: one that frames the volume.
+    pub camera: Option<CameraRequest>,
+    /// Size of the picture.
+    pub image: Option<ImageRequest>,
+    /// When to stop: whichever is reached first. Default: the technique's own number of samples.
+    pub budget: Option<BudgetRequest>,
+    /// Keys every random number of the render.
+    #[schemars(range(min = 0))]
+    pub seed: Option<u64>,
+    /// The techniques' own parameters, by technique.
+    #[serde(flatten)]
+    #[schemars(skip)]
+    pub parameters: Map<String, Value>,
+}
+
+/// What is looked at: exactly one of `id`, `builtin`, or the name of a field technique.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+pub struct VolumeRequest {
+    /// The id of an uploaded volume.
+    pub id: Option<String>,
+    /// The name of a built-in volume.
+    pub builtin: Option<String>,
+    /// Voxels a side of a built-in volume.
+    #[schemars(range(min = 8, max = 512))]
+    pub resolution: Option<u32>,
+    /// Seed of a built-in volume that is made of random numbers.
+    #[schemars(range(min = 0))]
+    pub seed: Option<u64>,
+    /// A field technique's parameters, by technique.
+    #[serde(flatten)]
+    #[schemars(skip)]
+    pub field: Map<String, Value>,
+}
+
+/// A camera: either `camera_to_world`, or `eye` with `target` and `up`.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CameraRequest {
+    /// Column-major 4x4 matrix, rigid, translation in the last column; the camera looks along -z with +y up (three.js, glTF).
+    #[schemars(length(min = 16, max = 16))]
+    pub camera_to_world: Option<Vec<f64>>,
+    /// Where the eye is, in world units (mm for a scan; the volume is centred at the origin).
+    pub eye: Option<[f64; 3]>,
+    /// What the eye looks at. Default: the volume's centre.
+    pub target: Option<[f64; 3]>,
+    /// Which way is up. Default: z for a scan, y for a built-in.
+    pub up: Option<[f64; 3]>,
+    /// Full vertical angle of view in degrees. Default 53.13.
+    #[schemars(range(min = 0.1, max = 179))]
+    pub fov_y_deg: Option<f64>,
+    /// `orthographic` shows what `fov_y_deg` would show in the target's plane.
+    #[schemars(extend("enum" = ["perspective", "orthographic"]))]
+    pub projection: Option<String>,
+}
+
+/// Size of the picture.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ImageRequest {
+    /// Pixels across. Default 512.
+    #[schemars(range(min = 1, max = 4096))]
+    pub width: Option<u32>,
+    /// Pixels down. Default 512.
+    #[schemars(range(min = 1, max = 4096))]
+    pub height: Option<u32>,
+}
+
+/// When to stop.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BudgetRequest {
+    /// Samples per pixel.
+    #[schemars(range(min = 1, max = 65536))]
+    pub samples: Option<u32>,
+    /// Milliseconds from the start of the render; the sample under way is finished.
+    #[schemars(range(min = 1, max = 3_600_000))]
+    pub time_ms: Option<u64>,
+    /// Stop when `error` is at most this.
+    #[schemars(range(min = 1e-6, max = 10))]
+    pub max_error: Option<f64>,
+}
+
+/// The JSON Schema of a wire type, self-contained, with closed objects and plain `enum`s.
+pub fn schema_of<T: JsonSchema>() -> Value {
+    let settings = schemars::generate::SchemaSettings::draft2020_12().with(|s| s.inline_subschemas = true);
+    let schema: Schema = SchemaGenerator::new(settings).into_root_schema_for::<T>();
+    let mut value = schema.to_value();
+    if let Some(object) = value.as_object_mut() {
+        object.remove("$schema");
+        object.insert("additionalProperties".into(), json!(false));
+    }
+    value
+}
+
+/// Checks `value` against `schema` and deserialises it. `at` is the JSON pointer of `value` in the body.
+///
+/// # Errors
+/// [`Error::Invalid`] with every violation, each with its pointer and the permitted range.
+pub fn parse<T: DeserializeOwned>(value: &Value, schema: &Value, at: &str) -> Result<T> {
+    check(value, schema, at)?;
+    T::deserialize(value)
+        .map_err(|e| Error::invalid(at, e.to_string(), "see the schema in /v1/techniques and /openapi.json"))
+}
+
+/// Checks `value` against `schema` only.
+///
+/// # Errors
+/// As [`parse`].
+pub fn check(value: &Value, schema: &Value, at: &str) -> Result<()> {
+    let validator = jsonschema::validator_for(schema).map_err(Error::internal)?;
+    let violations: Vec<Violation> =
+        validator.iter_errors(value).take(20).flat_map(|e| violation(&e, schema, at)).collect();
+    if violations.is_empty() { Ok(()) } else { Err(Error::Invalid(violations)) }
+}
+
+/// Our words for a schema error. An unknown field is reported at its own pointer, not its parent's.
+fn violation(error: &jsonschema::ValidationError<'_>, schema: &Value, at: &str) -> Vec<Violation> {
+    let pointer = format!("{at}{}", error.instance_path().as_str());
+    let shown = |limit: &Value| limit.to_string();
+    let range = || permitted_range(schema, error.instance_path().as_str());
+    let one = |detail: String, permitted: String| vec![Violation::new(pointer.clone(), detail, permitted)];
+    match error.kind() {
+        ValidationErrorKind::AdditionalProperties { unexpected } => {
+            let known = permitted_fields(schema, error.instance_path().as_str());
+            let at = |name: &String| format!("{pointer}/{}", name.replace('~', "~0").replace('/', "~1"));
+            unexpected.iter().map(|name| Violation::new(at(name), "unknown field", known.clone())).collect()
+        }
+        ValidationErrorKind::Minimum { limit } => {
+            one("too small".into(), range().unwrap_or(format!("at least {}", shown(limit))))
+        }
+        ValidationErrorKind::Maximum { limit } => {
+            one("too large".into(), range().unwrap_or(format!("at most {}", shown(limit))))
+        }
+        ValidationErrorKind::Enum { options } => one("not one of the permitted values".into(), options.to_string()),
+        ValidationErrorKind::MinItems { limit } => one("too few elements".into(), format!("at least {limit}")),
+        ValidationErrorKind::MaxItems { limit } => one("too many elements".into(), format!("at most {limit}")),
+        ValidationErrorKind::Required { property } => {
+            let name = property.as_str().unwrap_or_default();
+            vec![Violation::new(format!("{pointer}/{name}"), "this field is required", permitted_fields(schema, ""))]
+        }
+        ValidationErrorKind::Type { kind } => {
+            let wanted = match kind {
+                TypeKind::Single(t) => t.to_string(),
+                TypeKind::Multiple(types) => types.iter().map(|t| t.to_string()).collect::<Vec<_>>().join(" or "),
+            };
+            one("wrong type".into(), range().map_or(wanted.clone(), |r| format!("{wanted}, {r}")))
+        }
+        _ => one(error.to_string(), "see the schema in /v1/techniques and /openapi.json".into()),
+    }
+}
+
+/// The subschema that a path leads to, through `properties` and `items`.
+fn subschema<'s>(schema: &'s Value, path: &str) -> Option<&'s Value> {
+    path.split('/').skip(1).try_fold(schema, |s, part| match s.pointer(&format!("/properties/{part}")) {
+        Some(found) => Some(found),
+        None => s.get("items"),
+    })
+}
+
+fn permitted_range(schema: &Value, path: &str) -> Option<String> {
+    let s = subschema(schema, path)?;
+    match (s.get("minimum"), s.get("maximum")) {
+        (Some(low), Some(high)) => Some(format!("{low} to {high}")),
+        (Some(low), None) => Some(format!("at least {low}")),
+        (None, Some(high)) => Some(format!("at most {high}")),
+        (None, None) => None,
+    }
+}
+
+fn permitted_fields(schema: &Value, path: &str) -> String {
+    let names = |s: &Value| Some(s.get("properties")?.as_object()?.keys().cloned().collect::<Vec<_>>().join(", "));
+    subschema(schema, path).and_then(names).unwrap_or_default()
+}

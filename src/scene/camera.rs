@@ -1,0 +1,194 @@
+//! The camera: validated, in double precision, and what the device is told of it.
+
+use glam::{DAffine3, DMat3, DMat4, DVec3};
+
+use crate::device::structs::View;
+use crate::error::{Error, Result};
+use crate::request::CameraRequest;
+use crate::volume::Volume;
+
+/// Vertical angle of view when none is given: the contract's 53.13 degrees, twice the angle whose tangent is a half.
+const DEFAULT_FOV_Y_DEG: f64 = 53.13;
+/// How far a rotation's columns may be from orthonormal: what survives a client's single-precision matrix.
+const RIGID_TOLERANCE: f64 = 1e-3;
+
+/// A valid camera. Directions are unit vectors in world space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Camera {
+    eye: DVec3,
+    target: DVec3,
+    right: DVec3,
+    up: DVec3,
+    forward: DVec3,
+    fov_y_deg: f64,
+    perspective: bool,
+}
+
+fn finite(v: [f64; 3], at: &str) -> Result<DVec3> {
+    let v = DVec3::from(v);
+    if v.is_finite() && v.abs().max_element() <= 1e9 {
+        Ok(v)
+    } else {
+        Err(Error::invalid(at, "out of range", "-1e9 to 1e9"))
+    }
+}
+
+impl Camera {
+    /// A camera from a request, framing `volume` where the request is silent.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the field under `/camera`.
+    pub fn from_request(request: Option<&CameraRequest>, volume: &Framing) -> Result<Self> {
+        let empty = CameraRequest::default();
+        let r = request.unwrap_or(&empty);
+        let fov_y_deg = r.fov_y_deg.unwrap_or(DEFAULT_FOV_Y_DEG);
+        let perspective = r.projection.as_deref() != Some("orthographic");
+        if let Some(matrix) = &r.camera_to_world {
+            for (given, name) in [(r.eye.is_some(), "eye"), (r.target.is_some(), "target"), (r.up.is_some(), "up")] {
+                if given {
+                    let permitted = "either camera_to_world, or eye with target and up";
+                    return Err(Error::invalid(format!("/camera/{name}"), "given beside camera_to_world", permitted));
+                }
+            }
+            return Self::from_matrix(matrix, fov_y_deg, perspective);
+        }
+        let target = r.target.map_or(Ok(DVec3::ZERO), |t| finite(t, "/camera/target"))?;
+        let up = r.up.map_or(Ok(volume.up()), |u| finite(u, "/camera/up"))?;
+        let eye = match r.eye {
+            Some(eye) => finite(eye, "/camera/eye")?,
+            None => target + volume.direction() * volume.distance(up, fov_y_deg),
+        };
+        Self::look_at(eye, target, up, fov_y_deg, perspective)
+    }
+
+    fn look_at(eye: DVec3, target: DVec3, up: DVec3, fov_y_deg: f64, perspective: bool) -> Result<Self> {
+        let Some(forward) = (target - eye).try_normalize() else {
+            return Err(Error::invalid("/camera/eye", "the eye is at the target", "a point other than target"));
+        };
+        let Some(right) =
+            up.try_normalize().map(|u| forward.cross(u)).filter(|r| r.length() > 1e-6).map(DVec3::normalize)
+        else {
+            return Err(Error::invalid(
+                "/camera/up",
+                "up is zero or along the view direction",
+                "a direction across the view direction",
+            ));
+        };
+        Ok(Self { eye, target, right, up: right.cross(forward), forward, fov_y_deg, perspective })
+    }
+
+    /// `m` is column-major with the camera looking along -z.
+    fn from_matrix(m: &[f64], fov_y_deg: f64, perspective: bool) -> Result<Self> {
+        let at = "/camera/camera_to_world";
+        let columns: [f64; 16] =
+            m.try_into().map_err(|_| Error::invalid(at, "wrong number of elements", "16 numbers"))?;
+        let matrix = DMat4::from_cols_array(&columns);
+        let rotation = DMat3::from_mat4(matrix);
+        let rigid = "a rigid transform: orthonormal axes, no scale, no mirror, last row 0 0 0 1";
+        if !matrix.is_finite() || columns.iter().any(|c| c.abs() > 1e9) {
+            return Err(Error::invalid(at, "not finite or out of range", "numbers from -1e9 to 1e9"));
+        }
+        if rotation.determinant().abs() < 1e-9 {
+            return Err(Error::invalid(at, "the matrix is singular", rigid));
+        }
+        let skew = (rotation.transpose() * rotation - DMat3::IDENTITY)
+            .to_cols_array()
+            .into_iter()
+            .fold(0.0, |m: f64, e| m.max(e.abs()));
+        let last_row = [columns[3], columns[7], columns[11], columns[15] - 1.0];
+        if skew > RIGID_TOLERANCE || rotation.determinant() < 0.0 || last_row.iter().any(|e| e.abs() > RIGID_TOLERANCE)
+        {
+            return Err(Error::invalid(at, "the matrix scales, shears, mirrors or projects", rigid));
+        }
+        let eye = matrix.w_axis.truncate();
+        let (right, forward) = (rotation.x_axis.normalize(), -rotation.z_axis.normalize());
+        let target = eye + forward * eye.length().max(1e-3);
+        Ok(Self { eye, target, right, up: right.cross(forward), forward, fov_y_deg, perspective })
+    }
+
+    /// The camera as a client would send it: eye, target, up and angle.
+    pub fn to_json(&self) -> serde_json::Value {
+        serde_json::json!({
+            "eye": self.eye.to_array(), "target": self.target.to_array(), "up": self.up.to_array(),
+            "fov_y_deg": self.fov_y_deg, "projection": if self.perspective { "perspective" } else { "orthographic" },
+        })
+    }
+
+    /// Unit vector from the scene towards the eye: where a headlight shines from.
+    pub fn towards_eye(&self) -> DVec3 {
+        -self.forward
+    }
+
+    /// What the device is told for an image of `size` pixels of a volume: the plane near the volume and its pixels, worked out
+    /// in double precision so that a far eye costs no digits. The fields of the pass are left at zero.
+    pub fn device_view(&self, size: [u32; 2], volume: &Volume) -> View {
+        let index_from_world = volume.world_from_index().inverse();
+        let radius = super::radius(volume);
+        // The plane through the volume's centre; an eye inside or behind gets one just ahead of it instead.
+        let ahead = (-self.eye.dot(self.forward)).max(0.1 * radius);
+        let reach = if self.perspective { ahead } else { (self.target - self.eye).length() };
+        let pixel = 2.0 * reach * (0.5 * self.fov_y_deg.to_radians()).tan() / f64::from(size[1]);
+        let (right, down) = (self.right * pixel, -self.up * pixel);
+        let corner = -right * (f64::from(size[0]) / 2.0) - down * (f64::from(size[1]) / 2.0);
+        let plane_centre = self.eye + self.forward * ahead;
+        let towards = if self.perspective { self.forward * ahead + corner } else { self.forward };
+        let narrow = |v: DVec3| v.as_vec3().to_array();
+        let linear = |v: DVec3| narrow(index_from_world.transform_vector3(v));
+        View {
+            plane: narrow(index_from_world.transform_point3(plane_centre + corner)),
+            right: linear(right),
+            down: linear(down),
+            towards: linear(towards),
+            towards_world: narrow(towards),
+            right_world: narrow(right),
+            down_world: narrow(down),
+            t_eye: ahead as f32,
+            perspective: if self.perspective { -1 } else { 0 },
+            dims: volume.dims().map(|n| n as i32),
+            ..View::default()
+        }
+    }
+}
+
+/// What is needed of a volume to frame it: its box in the world and which way is up.
+#[derive(Debug, Clone, Copy)]
+pub struct Framing {
+    corners: [DVec3; 8],
+    scan: bool,
+}
+
+impl Framing {
+    /// The framing of a box given by its transform and voxels; `scan` when its world axes are a patient's.
+    pub fn new(world_from_index: &DAffine3, dims: [usize; 3], scan: bool) -> Self {
+        let corner = |i: usize| {
+            let pick = |axis: usize| if i >> axis & 1 == 1 { dims[axis] as f64 } else { 0.0 };
+            world_from_index.transform_point3(DVec3::new(pick(0), pick(1), pick(2)))
+        };
+        Self { corners: std::array::from_fn(corner), scan }
+    }
+
+    fn up(&self) -> DVec3 {
+        if self.scan { DVec3::Z } else { DVec3::Y }
+    }
+
+    /// From the centre to the eye: a patient's face a little from the side and above; a built-in from where the chamber is open.
+    fn direction(&self) -> DVec3 {
+        if self.scan { DVec3::new(-0.55, 1.0, 0.3).normalize() } else { DVec3::new(0.45, 0.32, -1.0).normalize() }
+    }
+
+    /// The distance at which every corner is inside a square picture, with a margin of 4 %.
+    fn distance(&self, up: DVec3, fov_y_deg: f64) -> f64 {
+        let back = self.direction();
+        let right = up.cross(back).normalize_or(DVec3::X);
+        let across = back.cross(right);
+        let tangent = (0.5 * fov_y_deg.to_radians()).tan();
+        let needs = |c: &DVec3| c.dot(right).abs().max(c.dot(across).abs()) / tangent + c.dot(back);
+        1.04 * self.corners.iter().map(needs).fold(0.0, f64::max).max(1e-3)
+    }
+}
+
+impl From<&Volume> for Framing {
+    fn from(volume: &Volume) -> Self {
+        Self::new(&volume.world_from_index(), volume.dims(), !matches!(volume.format(), "builtin" | "field"))
+    }
+}

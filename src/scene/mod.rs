@@ -1,0 +1,220 @@
+//! The validated scene. Fields are private: what a `Scene` holds has been checked, and nothing downstream checks again.
+
+pub mod camera;
+pub mod transfer;
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use serde_json::Value;
+
+use crate::config::Limits;
+use crate::error::{Error, Result};
+use crate::request::{self, BudgetRequest, CameraRequest, RenderRequest, VolumeRequest};
+use crate::technique::{self, Field, Technique, View};
+use crate::volume::{Store, Volume};
+use camera::{Camera, Framing};
+
+/// Pixels a side when the request is silent.
+const DEFAULT_SIDE: u32 = 512;
+/// Samples when the budget is silent: enough that the jitter's noise is below a grey level in most pictures.
+const DEFAULT_SAMPLES: u32 = 16;
+
+/// When a render stops: at the first that is reached.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Budget {
+    /// Samples per pixel.
+    pub samples: u32,
+    /// Milliseconds since the render's start.
+    pub time_ms: Option<u64>,
+    /// The error, as the film estimates it.
+    pub max_error: Option<f64>,
+}
+
+/// What is looked at.
+#[derive(Clone)]
+pub enum Subject {
+    /// A volume that is there.
+    Volume(Arc<Volume>),
+    /// A volume that is computed first.
+    Field(Arc<dyn Field>),
+}
+
+/// A valid render request with its defaults resolved.
+#[derive(Clone)]
+pub struct Scene {
+    technique: &'static Technique,
+    view: Arc<dyn View>,
+    subject: Subject,
+    framing: Framing,
+    camera: Camera,
+    image: [u32; 2],
+    budget: Budget,
+    seed: u64,
+}
+
+/// The radius of the sphere around a volume's box, world units.
+pub(crate) fn radius(volume: &Volume) -> f64 {
+    let [x, y, z] = volume.dims().map(|n| n as f64);
+    0.5 * volume.world_from_index().transform_vector3(DVec3::new(x, y, z)).length()
+}
+
+/// The mean side of a volume's box, world units.
+pub(crate) fn mean_side(volume: &Volume) -> f64 {
+    let side = |axis: usize| volume.dims()[axis] as f64 * volume.spacing()[axis];
+    (side(0) + side(1) + side(2)) / 3.0
+}
+
+/// The JSON Schema of a render request under `limits`: the shared fields and every technique's own.
+pub fn schema(limits: &Limits) -> Value {
+    let mut schema = request::schema_of::<RenderRequest>();
+    let names: Vec<&str> = technique::views().map(|t| t.name).collect();
+    schema["properties"]["technique"]["enum"] = names.into();
+    for t in technique::views() {
+        schema["properties"][t.name] = (t.schema)();
+    }
+    schema["properties"]["volume"]["additionalProperties"] = false.into();
+    for t in technique::fields() {
+        schema["properties"]["volume"]["properties"][t.name] = (t.schema)();
+        schema["properties"]["volume"]["properties"][t.name]["properties"]["photons"]["maximum"] =
+            limits.max_photons.into();
+    }
+    for side in ["width", "height"] {
+        schema["properties"]["image"]["properties"][side]["maximum"] = limits.max_image_side.into();
+    }
+    schema["properties"]["budget"]["properties"]["samples"]["maximum"] = limits.max_samples.into();
+    schema["properties"]["budget"]["properties"]["time_ms"]["maximum"] = limits.max_time_ms.into();
+    schema
+}
+
+impl Scene {
+    /// Checks `body` and resolves its defaults; loads the volume that it names.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] with JSON pointers and permitted ranges.
+    pub fn from_json(body: &Value, store: &Store, limits: &Limits) -> Result<Self> {
+        if !body.is_object() {
+            return Err(Error::invalid("", "not an object", "a JSON object with at least technique"));
+        }
+        let request: RenderRequest = request::parse(body, &schema(limits), "")?;
+        let technique = technique::find(&request.technique)
+            .ok_or_else(|| Error::internal("the schema permits a technique that is not in the list"))?;
+        let technique::Kind::View(parse) = technique.kind else {
+            return Err(Error::invalid(
+                "/technique",
+                "this is a field technique",
+                "a view; put the field under volume",
+            ));
+        };
+        let empty = Value::Object(Default::default());
+        let view = parse(request.parameters.get(technique.name).unwrap_or(&empty), &format!("/{}", technique.name))?;
+        let (subject, framing) = subject(request.volume.as_ref(), store)?;
+        let camera = Camera::from_request(request.camera.as_ref(), &framing)?;
+        let image = request.image.unwrap_or_default();
+        let image = [image.width.unwrap_or(DEFAULT_SIDE), image.height.unwrap_or(DEFAULT_SIDE)];
+        let budget = budget(&request.budget.unwrap_or_default(), limits);
+        let scene = Self { technique, view, subject, framing, camera, image, budget, seed: request.seed.unwrap_or(0) };
+        if let Subject::Volume(volume) = &scene.subject {
+            scene.view.plan(volume)?;
+        }
+        Ok(scene)
+    }
+
+    /// The same scene from another camera, given as the body of `PUT …/camera`.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the field under `/camera`.
+    pub fn camera_from_json(&self, body: &Value) -> Result<Camera> {
+        let request: CameraRequest = request::parse(body, &request::schema_of::<CameraRequest>(), "/camera")?;
+        Camera::from_request(Some(&request), &self.framing)
+    }
+
+    /// Puts another camera in.
+    pub fn set_camera(&mut self, camera: Camera) {
+        self.camera = camera;
+    }
+
+    /// The view technique.
+    pub fn technique(&self) -> &'static Technique {
+        self.technique
+    }
+    /// The view with its parameters.
+    pub fn view(&self) -> &Arc<dyn View> {
+        &self.view
+    }
+    /// What is looked at.
+    pub fn subject(&self) -> &Subject {
+        &self.subject
+    }
+    /// The camera.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+    /// Width and height in pixels.
+    pub fn image(&self) -> [u32; 2] {
+        self.image
+    }
+    /// When to stop.
+    pub fn budget(&self) -> Budget {
+        self.budget
+    }
+    /// The seed of every random number.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+}
+
+/// A budget that names only a time or an error may take as many samples as the server permits.
+fn budget(request: &BudgetRequest, limits: &Limits) -> Budget {
+    let open = request.time_ms.is_some() || request.max_error.is_some();
+    let default = if open { limits.max_samples } else { DEFAULT_SAMPLES.min(limits.max_samples) };
+    Budget { samples: request.samples.unwrap_or(default), time_ms: request.time_ms, max_error: request.max_error }
+}
+
+fn subject(request: Option<&VolumeRequest>, store: &Store) -> Result<(Subject, Framing)> {
+    let Some(request) = request else { return built_in("smoke", None, None, store) };
+    let given = usize::from(request.id.is_some()) + usize::from(request.builtin.is_some()) + request.field.len();
+    if given != 1 {
+        let permitted = "exactly one of id, builtin, or a field technique";
+        return Err(Error::invalid("/volume", format!("{given} sources are given"), permitted));
+    }
+    if request.builtin.is_none() {
+        for (name, set) in [("resolution", request.resolution.is_some()), ("seed", request.seed.is_some())] {
+            if set {
+                return Err(Error::invalid(
+                    format!("/volume/{name}"),
+                    "only for a built-in volume",
+                    "leave it out, or name a builtin",
+                ));
+            }
+        }
+    }
+    if let Some(id) = &request.id {
+        let volume = store.get(id).map_err(|e| match e {
+            Error::NotFound { .. } => {
+                Error::invalid("/volume/id", format!("there is no volume '{id}'"), "an id from /v1/volumes")
+            }
+            other => other,
+        })?;
+        return Ok((Subject::Volume(volume.clone()), Framing::from(&*volume)));
+    }
+    if let Some(name) = &request.builtin {
+        return built_in(name, request.resolution, request.seed, store);
+    }
+    let (name, parameters) = request.field.iter().next().ok_or_else(|| Error::internal("a field without a name"))?;
+    let Some(technique::Kind::Field(parse)) = technique::find(name).map(|t| t.kind) else {
+        return Err(Error::internal("the schema permits a field that is not in the list"));
+    };
+    let field = parse(parameters, &format!("/volume/{name}"))?;
+    let framing = field.framing();
+    Ok((Subject::Field(field), framing))
+}
+
+fn built_in(name: &str, resolution: Option<u32>, seed: Option<u64>, store: &Store) -> Result<(Subject, Framing)> {
+    if !crate::volume::builtin::NAMES.contains(&name) {
+        let permitted = crate::volume::builtin::NAMES.join(", ");
+        return Err(Error::invalid("/volume/builtin", format!("there is no built-in volume '{name}'"), permitted));
+    }
+    let volume = store.builtin(name, resolution.unwrap_or(128) as usize, seed.unwrap_or(0))?;
+    Ok((Subject::Volume(volume.clone()), Framing::from(&*volume)))
+}

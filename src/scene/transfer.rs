@@ -1,0 +1,237 @@
+//! The transfer function: value to colour and opacity per unit length, as control points or a preset.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, Result, Violation};
+use crate::volume::Volume;
+
+/// Entries of the table that the device reads. `TABLE_SIZE` in `kernels/emission_absorption.cl`.
+pub const TABLE_SIZE: usize = 4096;
+/// The optical depth that a preset's opacity 1 has across the volume's mean side: nearly opaque, still soft.
+const PRESET_OPTICAL_DEPTH: f64 = 24.0;
+
+/// A transfer function in a request: a preset, or control points.
+#[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TransferRequest {
+    /// `ramp`, `hls` (hue by value, opacity by power), `ct_bone` or `mri_head`. Default: what suits the volume.
+    #[schemars(extend("enum" = ["ramp", "hls", "ct_bone", "mri_head"]))]
+    pub preset: Option<String>,
+    /// `hls`: turns the hue, in turns.
+    #[schemars(range(min = 0, max = 1))]
+    pub rotation: Option<f64>,
+    /// `hls`: opacity = pow(v / vmax, exponent).
+    #[schemars(range(min = 0.01, max = 20))]
+    pub exponent: Option<f64>,
+    /// Control points in rising order of value, linear between them, constant outside. Instead of a preset.
+    #[schemars(length(min = 1, max = 256))]
+    pub points: Option<Vec<ControlPoint>>,
+}
+
+/// One control point.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ControlPoint {
+    /// The volume's value here.
+    pub value: f64,
+    /// Linear red, green, blue, each from 0 to 1.
+    #[schemars(inner(range(min = 0, max = 1)))]
+    pub color: [f64; 3],
+    /// Extinction per world unit (per mm for a scan).
+    #[schemars(range(min = 0, max = 1e6))]
+    pub opacity_per_unit: f64,
+}
+
+/// A valid transfer function for one volume.
+#[derive(Debug, Clone, PartialEq)]
+pub enum TransferFunction {
+    /// Linear between control points.
+    Points(Vec<ControlPoint>),
+    /// The lecture's (C, alpha) = HLS((v / vmax + rotation) 360, 0.5, 1), pow(v / vmax, exponent).
+    Hls {
+        /// Turns of hue added.
+        rotation: f64,
+        /// Exponent of the opacity.
+        exponent: f64,
+        /// The value of hue turn 1 and full opacity.
+        value_max: f64,
+        /// Opacity per world unit at full opacity.
+        opacity_per_unit: f64,
+    },
+}
+
+/// sRGB's decoding (IEC 61966-2-1), for colours that are chosen by eye.
+fn linear(srgb: f64) -> f64 {
+    if srgb <= 0.04045 { srgb / 12.92 } else { ((srgb + 0.055) / 1.055).powf(2.4) }
+}
+
+fn by_eye(value: f64, rgb: u32, opacity_per_unit: f64) -> ControlPoint {
+    let channel = |shift: u32| linear(f64::from(rgb >> shift & 0xff) / 255.0);
+    ControlPoint { value, color: [channel(16), channel(8), channel(0)], opacity_per_unit }
+}
+
+/// A preset's points: (place, colour, opacity from 0 to 1). Places are fractions of the value range.
+type PresetPoints = &'static [(f64, u32, f64)];
+
+const RAMP: PresetPoints = &[(0.0, 0x1a1a80, 0.0), (0.5, 0xe08040, 0.5), (1.0, 0xfff8e0, 1.0)];
+/// Air, skin, muscle and fluid, grey matter, white matter and fat of a T1 head.
+const MRI_HEAD: PresetPoints = &[
+    (0.0, 0x000000, 0.0),
+    (0.13, 0x5a2e22, 0.0),
+    (0.22, 0xb0694a, 0.10),
+    (0.34, 0xc98f70, 0.16),
+    (0.50, 0xd8b49a, 0.40),
+    (0.65, 0xf0dcc8, 1.0),
+    (1.0, 0xffffff, 2.0),
+];
+/// Bone of a CT whose values are not Hounsfield units.
+const CT_BONE: PresetPoints = &[
+    (0.0, 0x000000, 0.0),
+    (0.30, 0x6a2a1c, 0.0),
+    (0.42, 0xa8583c, 0.06),
+    (0.55, 0xd8b890, 0.9),
+    (0.75, 0xf4ead2, 3.0),
+    (1.0, 0xffffff, 6.0),
+];
+/// The same in Hounsfield units: bone starts at about 200, dense bone at 700.
+const CT_BONE_HOUNSFIELD: PresetPoints = &[
+    (-1000.0, 0x000000, 0.0),
+    (120.0, 0x6a2a1c, 0.0),
+    (220.0, 0xb07850, 0.2),
+    (450.0, 0xe0c8a0, 1.5),
+    (1000.0, 0xf6eedc, 4.0),
+    (2000.0, 0xffffff, 6.0),
+];
+
+/// Whether a range of values looks like Hounsfield units: air far below 0 and bone far above.
+fn is_hounsfield(range: [f64; 2]) -> bool {
+    range[0] <= -500.0 && range[1] >= 600.0
+}
+
+impl TransferFunction {
+    /// The valid function of a request for `volume`. `at` is its JSON pointer. Also the name of what was taken.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the field.
+    pub fn from_request(request: &TransferRequest, volume: &Volume, at: &str) -> Result<(Self, String)> {
+        if let Some(points) = &request.points {
+            if request.preset.is_some() {
+                return Err(Error::invalid(format!("{at}/points"), "given beside preset", "either points or preset"));
+            }
+            return Self::from_points(points, at).map(|f| (f, format!("{} control points", points.len())));
+        }
+        let suits = match (volume.format(), is_hounsfield(volume.range())) {
+            ("builtin" | "field", _) => "ramp",
+            (_, true) => "ct_bone",
+            (_, false) => "mri_head",
+        };
+        let preset = request.preset.as_deref().unwrap_or(suits);
+        let full = PRESET_OPTICAL_DEPTH / super::mean_side(volume);
+        let function = match preset {
+            "hls" => Self::Hls {
+                rotation: request.rotation.unwrap_or(0.0),
+                exponent: request.exponent.unwrap_or(2.0),
+                value_max: volume.range()[1],
+                opacity_per_unit: full,
+            },
+            "ct_bone" if is_hounsfield(volume.range()) => Self::from_preset(CT_BONE_HOUNSFIELD, [0.0, 1.0], full),
+            "ct_bone" => Self::from_preset(CT_BONE, volume.range(), full),
+            "mri_head" => Self::from_preset(MRI_HEAD, volume.range(), full),
+            _ => Self::from_preset(RAMP, volume.range(), full),
+        };
+        Ok((function, format!("the preset {preset}")))
+    }
+
+    fn from_points(points: &[ControlPoint], at: &str) -> Result<Self> {
+        let mut wrong = Vec::new();
+        for (i, pair) in points.windows(2).enumerate() {
+            if pair[1].value <= pair[0].value {
+                let permitted = format!("more than {}", pair[0].value);
+                wrong.push(Violation::new(format!("{at}/points/{}/value", i + 1), "values must rise", permitted));
+            }
+        }
+        if wrong.is_empty() { Ok(Self::Points(points.to_vec())) } else { Err(Error::Invalid(wrong)) }
+    }
+
+    fn from_preset(points: PresetPoints, [low, high]: [f64; 2], full: f64) -> Self {
+        let place = |f: f64| low + (high - low) * f;
+        Self::Points(points.iter().map(|&(f, rgb, opacity)| by_eye(place(f), rgb, opacity * full)).collect())
+    }
+
+    /// Linear colour and opacity per unit at a value.
+    pub fn evaluate(&self, value: f64) -> ([f64; 3], f64) {
+        match self {
+            Self::Points(points) => evaluate_points(points, value),
+            Self::Hls { rotation, exponent, value_max, opacity_per_unit } => {
+                let v = if *value_max > 0.0 { (value / value_max).clamp(0.0, 1.0) } else { 0.0 };
+                (hue((v + rotation).fract()), v.powf(*exponent) * opacity_per_unit)
+            }
+        }
+    }
+
+    /// The device's table over `[low, high]`: `TABLE_SIZE` opacities, then red and green, then blue, as pairs of 16 bits.
+    pub fn table(&self, [low, high]: [f64; 2], opacity_scale: f64) -> Vec<f32> {
+        let mut table = vec![0.0f32; 3 * TABLE_SIZE];
+        let bits = |c: f64| (c.clamp(0.0, 1.0) * 65535.0).round() as u32;
+        for i in 0..TABLE_SIZE {
+            let (color, sigma) = self.evaluate(low + (high - low) * i as f64 / (TABLE_SIZE - 1) as f64);
+            table[i] = (sigma * opacity_scale) as f32;
+            table[TABLE_SIZE + i] = f32::from_bits(bits(color[0]) | bits(color[1]) << 16);
+            table[2 * TABLE_SIZE + i] = f32::from_bits(bits(color[2]));
+        }
+        table
+    }
+}
+
+fn evaluate_points(points: &[ControlPoint], value: f64) -> ([f64; 3], f64) {
+    let after = points.partition_point(|p| p.value <= value);
+    let (Some(a), Some(b)) = (after.checked_sub(1).map(|i| points[i]).or(points.first().copied()), points.get(after))
+    else {
+        return points.last().map_or(([0.0; 3], 0.0), |p| (p.color, p.opacity_per_unit));
+    };
+    let f = if b.value > a.value { (value - a.value) / (b.value - a.value) } else { 0.0 };
+    let mix = |x: f64, y: f64| x + (y - x) * f.clamp(0.0, 1.0);
+    (std::array::from_fn(|c| mix(a.color[c], b.color[c])), mix(a.opacity_per_unit, b.opacity_per_unit))
+}
+
+/// HLS(turn 360, 0.5, 1) as linear RGB: lightness a half and saturation 1 are the pure hues.
+fn hue(turn: f64) -> [f64; 3] {
+    let channel = |shift: f64| {
+        let t = (turn + shift).rem_euclid(1.0) * 6.0;
+        linear(((t - 3.0).abs() - 1.0).clamp(0.0, 1.0))
+    };
+    [channel(0.0), channel(-1.0 / 3.0), channel(-2.0 / 3.0)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(value: f64, grey: f64, opacity_per_unit: f64) -> ControlPoint {
+        ControlPoint { value, color: [grey; 3], opacity_per_unit }
+    }
+
+    #[test]
+    fn points_are_linear_between_and_constant_outside() {
+        let points = [point(1.0, 0.0, 2.0), point(3.0, 1.0, 6.0)];
+        for (value, grey, sigma) in
+            [(0.0, 0.0, 2.0), (1.0, 0.0, 2.0), (1.5, 0.25, 3.0), (3.0, 1.0, 6.0), (9.0, 1.0, 6.0)]
+        {
+            assert_eq!(evaluate_points(&points, value), ([grey; 3], sigma), "at {value}");
+        }
+    }
+
+    #[test]
+    fn hue_is_the_colour_wheel() {
+        assert_eq!(hue(0.0), [1.0, 0.0, 0.0]);
+        assert_eq!(hue(1.0 / 3.0).map(|c| (c * 1e9).round() / 1e9), [0.0, 1.0, 0.0]);
+        assert_eq!(hue(2.0 / 3.0).map(|c| (c * 1e9).round() / 1e9), [0.0, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn unsorted_points_are_named() {
+        let wrong = TransferFunction::from_points(&[point(1.0, 0.0, 0.0), point(1.0, 0.0, 0.0)], "/t");
+        assert!(matches!(wrong, Err(Error::Invalid(v)) if v[0].pointer == "/t/points/1/value"));
+    }
+}

@@ -1,0 +1,140 @@
+//! The techniques: the trait of each kind and the one list. A technique is three files of one name and one line here.
+
+pub mod emission_absorption;
+pub mod photon_transport;
+
+use std::sync::Arc;
+
+use serde_json::Value;
+
+use crate::device::program::{Source, Variant};
+use crate::error::Result;
+use crate::scene::camera::{Camera, Framing};
+use crate::volume::Volume;
+
+/// Every technique. Adding one is one line.
+pub const ALL: &[Technique] = &[emission_absorption::TECHNIQUE, photon_transport::TECHNIQUE];
+
+/// What the service knows of a technique.
+pub struct Technique {
+    /// Its name: of its Rust file, its kernel, its test, and in a request.
+    pub name: &'static str,
+    /// What it computes, in a sentence.
+    pub summary: &'static str,
+    /// JSON Schema of its own parameters.
+    pub schema: fn() -> Value,
+    /// A request that works as it is.
+    pub example: fn() -> Value,
+    /// Its kernel and the variants of it.
+    pub source: fn() -> Source,
+    /// Whether it is a view or a field, with its parser: parameters and their JSON pointer.
+    pub kind: Kind,
+}
+
+/// The two kinds of technique.
+#[derive(Clone, Copy)]
+pub enum Kind {
+    /// Turns a camera into an image.
+    View(fn(&Value, &str) -> Result<Arc<dyn View>>),
+    /// Fills a grid.
+    Field(fn(&Value, &str) -> Result<Arc<dyn Field>>),
+}
+
+impl Technique {
+    /// `view` or `field`.
+    pub fn kind_name(&self) -> &'static str {
+        match self.kind {
+            Kind::View(_) => "view",
+            Kind::Field(_) => "field",
+        }
+    }
+}
+
+/// What a view's kernel is run with for one volume: data, no device needed to make it.
+#[derive(Debug, Clone)]
+pub struct ViewPlan {
+    /// The kernel variant.
+    pub variant: Variant,
+    /// Chebyshev distance in macro-cells to the nearest occupied one, a byte a cell.
+    pub distances: Vec<u8>,
+    /// Read-only table, such as a transfer function.
+    pub table: Vec<f32>,
+    /// The step of the finest pass, world units.
+    pub step: f32,
+    /// Past this opacity a ray ends; what it leaves out is part of the error.
+    pub opacity_threshold: f64,
+    /// Why it is planned so, in words.
+    pub reasons: Vec<String>,
+}
+
+/// A view with valid parameters.
+pub trait View: Send + Sync {
+    /// What to run for `volume`.
+    ///
+    /// # Errors
+    /// `Error::Invalid` where parameters and volume do not go together.
+    fn plan(&self, volume: &Volume) -> Result<ViewPlan>;
+    /// The kernel's own parameters for a camera, as the bytes of its device struct.
+    fn parameters(&self, volume: &Volume, camera: &Camera) -> Vec<u8>;
+}
+
+/// What a field's kernel is run with: data, no device needed to make it.
+pub struct FieldPlan {
+    /// The kernel variant.
+    pub variant: Variant,
+    /// The kernel's own parameters, as the bytes of its device struct; the run writes the range into a `FieldPass` beside it.
+    pub parameters: Vec<u8>,
+    /// Read-only data, such as the extinction of every voxel.
+    pub table: Vec<f32>,
+    /// Cells of the grid of 64-bit sums.
+    pub cells: usize,
+    /// 64-bit sums beside the grid, such as the energy ledger.
+    pub ledger: usize,
+    /// How many histories (photons) make the whole.
+    pub histories: u64,
+    /// Histories that a lane of a work-item takes one after the other.
+    pub histories_per_lane: u32,
+    /// Why it is planned so, in words.
+    pub reasons: Vec<String>,
+}
+
+/// What a field has come to: a volume to look at and what stands under `result` in the reply.
+pub struct FieldResult {
+    /// The grid, normalised per history.
+    pub volume: Volume,
+    /// The ledger and what else was measured.
+    pub result: Value,
+}
+
+/// A field with valid parameters.
+pub trait Field: Send + Sync {
+    /// The framing of its grid.
+    fn framing(&self) -> Framing;
+    /// What to run.
+    ///
+    /// # Errors
+    /// `Error::Internal` when its input cannot be made.
+    fn plan(&self) -> Result<FieldPlan>;
+    /// Keys its random numbers.
+    fn seed(&self) -> u64;
+    /// The volume and the result after `histories` of them, from the grid's sums and the ledger of every batch (batches are equal).
+    ///
+    /// # Errors
+    /// `Error::Internal` when the volume cannot be made.
+    fn finish(&self, grid: &[u64], ledgers: &[Vec<u64>], histories: u64) -> Result<FieldResult>;
+}
+
+/// The technique of a name.
+pub fn find(name: &str) -> Option<&'static Technique> {
+    ALL.iter().find(|t| t.name == name)
+}
+
+/// The views, in the list's order.
+pub fn views() -> impl Iterator<Item = &'static Technique> {
+    ALL.iter().filter(|t| matches!(t.kind, Kind::View(_)))
+}
+
+/// The fields, in the list's order.
+pub fn fields() -> impl Iterator<Item = &'static Technique> {
+    ALL.iter().filter(|t| matches!(t.kind, Kind::Field(_)))
+}
