@@ -1,0 +1,56 @@
+//! Charts as SVG, drawn by a plotting library.
+
+use plotters::prelude::*;
+
+use crate::error::{Error, Result};
+use crate::job::TracePoint;
+
+/// Relative errors below this are drawn here: a logarithmic axis has no 0.
+const LEAST_ERROR: f64 = 1e-6;
+
+/// A render's error against time, both on logarithmic axes; previews of fewer pixels are hollow.
+///
+/// # Errors
+/// [`Error::Internal`] when drawing fails.
+pub fn convergence(trace: &[TracePoint], state: &str) -> Result<String> {
+    let mut svg = String::new();
+    draw(&mut svg, trace, state).map_err(Error::internal)?;
+    Ok(svg)
+}
+
+fn draw(svg: &mut String, trace: &[TracePoint], state: &str) -> std::result::Result<(), Box<dyn std::error::Error>> {
+    let points: Vec<(f64, f64, bool)> =
+        trace.iter().map(|p| (p.elapsed_ms.max(0.1), p.error.max(LEAST_ERROR), p.stride == 1)).collect();
+    let least =
+        |v: &dyn Fn(&(f64, f64, bool)) -> f64, none: f64| points.iter().map(v).reduce(f64::min).unwrap_or(none) / 1.5;
+    let most =
+        |v: &dyn Fn(&(f64, f64, bool)) -> f64, none: f64| points.iter().map(v).reduce(f64::max).unwrap_or(none) * 1.5;
+    let (time, error) = (|p: &(f64, f64, bool)| p.0, |p: &(f64, f64, bool)| p.1);
+    let (x, y) = (least(&time, 1.0)..most(&time, 1000.0), least(&error, 1e-3)..most(&error, 1.0));
+    let area = SVGBackend::with_string(svg, (640, 400)).into_drawing_area();
+    area.fill(&WHITE)?;
+    let samples = trace.last().map_or(0, |p| p.samples);
+    let mut chart = ChartBuilder::on(&area)
+        .caption(format!("Error against time: {state}, {samples} samples"), ("sans-serif", 18))
+        .margin(12)
+        .x_label_area_size(42)
+        .y_label_area_size(72)
+        .build_cartesian_2d(x.log_scale(), y.log_scale())?;
+    chart
+        .configure_mesh()
+        .x_desc("elapsed / ms")
+        .y_desc("relative error (RMS)")
+        .x_label_formatter(&|v| plain(*v))
+        .y_label_formatter(&|v| plain(*v))
+        .draw()?;
+    chart.draw_series(LineSeries::new(points.iter().map(|p| (p.0, p.1)), &BLUE))?;
+    let dot = |p: &(f64, f64, bool)| Circle::new((p.0, p.1), 3, if p.2 { BLUE.filled() } else { BLUE.stroke_width(1) });
+    chart.draw_series(points.iter().map(dot))?;
+    area.present()?;
+    Ok(())
+}
+
+/// A number as short as it can be read.
+fn plain(v: f64) -> String {
+    if (0.01..1e5).contains(&v) { format!("{}", (v * 1e4).round() / 1e4) } else { format!("{v:.0e}") }
+}

@@ -1,0 +1,276 @@
+//! The film on the host: what a view has gathered so far, its estimated error, and the picture of it.
+
+use serde::Serialize;
+
+/// Means and squared deviations of one set of samples, as the device leaves them (`kernels/shared/film.h`).
+#[derive(Debug, Clone, Default)]
+pub struct Samples {
+    /// Width in its own pixels.
+    pub width: usize,
+    /// Height in its own pixels.
+    pub height: usize,
+    /// It holds every `stride`-th pixel of the full image.
+    pub stride: usize,
+    /// Samples per pixel.
+    pub count: u32,
+    /// Mean linear R, G, B and alpha of every pixel.
+    pub mean: Vec<f32>,
+    /// Sum of squared deviations of the luminance of every pixel.
+    pub m2: Vec<f32>,
+}
+
+/// The luminance of linear sRGB (ITU-R BT.709), `luminance` of the kernel.
+fn luminance(p: &[f32]) -> f64 {
+    0.2126 * f64::from(p[0]) + 0.7152 * f64::from(p[1]) + 0.0722 * f64::from(p[2])
+}
+
+impl Samples {
+    fn luminance(&self, pixel: usize) -> f64 {
+        luminance(&self.mean[4 * pixel..])
+    }
+
+    fn pixels(&self) -> usize {
+        self.width * self.height
+    }
+
+    /// Variance of one sample of a pixel's luminance; 0 where there is but one.
+    fn variance(&self, pixel: usize) -> f64 {
+        if self.count < 2 { 0.0 } else { f64::from(self.m2[pixel]) / f64::from(self.count - 1) }
+    }
+
+    fn mean_luminance(&self) -> f64 {
+        (0..self.pixels()).map(|i| self.luminance(i)).sum::<f64>() / self.pixels().max(1) as f64
+    }
+
+    /// Root mean square of the deviation from the mean of each 2×2 block: what half the resolution would lose, which bounds
+    /// what this resolution loses on a picture that is smooth at its scale.
+    fn resolution_error(&self) -> f64 {
+        let (mut sum, mut blocks) = (0.0, 0usize);
+        for y in (0..self.height.saturating_sub(1)).step_by(2) {
+            for x in (0..self.width.saturating_sub(1)).step_by(2) {
+                let at = y * self.width + x;
+                let four = [at, at + 1, at + self.width, at + self.width + 1].map(|i| self.luminance(i));
+                let mean = four.iter().sum::<f64>() / 4.0;
+                sum += four.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / 4.0;
+                blocks += 1;
+            }
+        }
+        (sum / blocks.max(1) as f64).sqrt()
+    }
+}
+
+/// The estimated error of a picture: root mean square over its pixels of the error of linear luminance, divided by the
+/// picture's mean luminance (absolute where that is 0). A part is null where it is not known apart from the others.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Default)]
+pub struct ErrorEstimate {
+    /// All parts together.
+    pub total: f64,
+    /// Standard error of the mean over the samples.
+    pub noise: Option<f64>,
+    /// The difference that halving the step made, less its noise.
+    pub discretisation: Option<f64>,
+    /// What a picture of fewer pixels than asked for leaves out.
+    pub resolution: Option<f64>,
+    /// What lies behind the opacity at which rays end.
+    pub truncation: Option<f64>,
+    /// What a field that is still being computed contributes: the change since it had half its histories.
+    pub field: Option<f64>,
+}
+
+/// What a view has gathered: its samples, and those of a control at twice the step on every second pixel.
+#[derive(Debug, Clone, Default)]
+pub struct Film {
+    /// Size of the picture asked for.
+    pub size: [usize; 2],
+    /// The samples; `stride` is 1 but for a preview.
+    pub main: Samples,
+    /// The control, if there is one yet.
+    pub control: Option<Samples>,
+    /// Opacity at which rays end.
+    pub opacity_threshold: f64,
+    /// Relative change of the picture since the field had half its histories.
+    pub field_error: Option<f64>,
+}
+
+impl Film {
+    /// The error as it can be told from the samples alone.
+    pub fn error(&self) -> ErrorEstimate {
+        let mean = self.main.mean_luminance();
+        let relative = |absolute: f64| if mean > 0.0 { absolute / mean } else { absolute };
+        let n = f64::from(self.main.count.max(1));
+        let pixels = self.main.pixels().max(1) as f64;
+        let noise = (self.main.count >= 2)
+            .then(|| ((0..self.main.pixels()).map(|i| self.main.variance(i)).sum::<f64>() / n / pixels).sqrt());
+        let truncation = self.truncation();
+        let (discretisation, joint) = match (&self.control, self.main.stride) {
+            (Some(control), 1) => self.against(control),
+            _ => (None, None),
+        };
+        let resolution = (self.main.stride > 1).then(|| self.main.resolution_error());
+        let parts = [noise, discretisation.or(joint), resolution, Some(truncation)];
+        let own = parts.iter().flatten().map(|e| e * e).sum::<f64>().sqrt();
+        let total = relative(own).hypot(self.field_error.unwrap_or(0.0));
+        ErrorEstimate {
+            total,
+            noise: noise.map(relative),
+            discretisation: discretisation.map(relative),
+            resolution: resolution.map(relative),
+            truncation: Some(relative(truncation)),
+            field: self.field_error,
+        }
+    }
+
+    /// The difference to the control, whose step is twice as long. A method of first order or better is at most this wrong:
+    /// |I(h) − I| ≤ |I(2h) − I(h)|. With two samples or more the noise of both is taken off and the rest is discretisation;
+    /// with one sample the two cannot be told apart, and the second value is both together.
+    fn against(&self, control: &Samples) -> (Option<f64>, Option<f64>) {
+        let n = f64::from(self.main.count);
+        let m = f64::from(control.count);
+        let (mut squared, mut noise, mut pixels) = (0.0, 0.0, 0usize);
+        for y in 0..control.height {
+            for x in 0..control.width {
+                let at = (y * control.stride) * self.main.width + x * control.stride;
+                squared += (self.main.luminance(at) - control.luminance(y * control.width + x)).powi(2);
+                noise += self.main.variance(at) * (1.0 / n + 1.0 / m);
+                pixels += 1;
+            }
+        }
+        let pixels = pixels.max(1) as f64;
+        if self.main.count < 2 {
+            return (None, Some((squared / pixels).sqrt()));
+        }
+        (Some(((squared - noise) / pixels).max(0.0).sqrt()), None)
+    }
+
+    /// Rays that ended early leave out what is behind: at most what is in front of it, times what still gets through.
+    fn truncation(&self) -> f64 {
+        let ended = |i: usize| {
+            let through = 1.0 - f64::from(self.main.mean[4 * i + 3]);
+            if through <= 1.0 - self.opacity_threshold {
+                (through.max(0.0) * self.main.luminance(i)).powi(2)
+            } else {
+                0.0
+            }
+        };
+        ((0..self.main.pixels()).map(ended).sum::<f64>() / self.main.pixels().max(1) as f64).sqrt()
+    }
+
+    /// Relative root-mean-square difference in luminance to another film of the same size.
+    pub fn difference(&self, other: &Film) -> Option<f64> {
+        if self.main.mean.len() != other.main.mean.len() || self.main.stride != other.main.stride {
+            return None;
+        }
+        let squared: f64 =
+            (0..self.main.pixels()).map(|i| (self.main.luminance(i) - other.main.luminance(i)).powi(2)).sum();
+        let rms = (squared / self.main.pixels().max(1) as f64).sqrt();
+        let mean = self.main.mean_luminance();
+        Some(if mean > 0.0 { rms / mean } else { rms })
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        let held = |s: &Samples| 4 * (s.mean.len() + s.m2.len());
+        held(&self.main) + self.control.as_ref().map_or(0, held)
+    }
+
+    /// The picture in linear R, G, B, row by row from the top; a preview is interpolated to the full size.
+    pub fn linear_rgb(&self) -> Vec<f32> {
+        let [width, height] = self.size;
+        if self.main.stride == 1 {
+            return self.main.mean.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
+        }
+        let mut out = Vec::with_capacity(width * height * 3);
+        let place = |full: usize, n: usize| {
+            let at = (full as f32 / self.main.stride as f32).min((n - 1) as f32);
+            let low = (at as usize).min(n.saturating_sub(2));
+            (low, (low + 1).min(n - 1), at - low as f32)
+        };
+        for y in 0..height {
+            let (y0, y1, fy) = place(y, self.main.height);
+            for x in 0..width {
+                let (x0, x1, fx) = place(x, self.main.width);
+                for c in 0..3 {
+                    let at = |x: usize, y: usize| self.main.mean[4 * (y * self.main.width + x) + c];
+                    let (top, low) =
+                        (at(x0, y0) + (at(x1, y0) - at(x0, y0)) * fx, at(x0, y1) + (at(x1, y1) - at(x0, y1)) * fx);
+                    out.push(top + (low - top) * fy);
+                }
+            }
+        }
+        out
+    }
+
+    /// The picture in sRGB bytes (IEC 61966-2-1), clipped at 1, and how many values were clipped.
+    pub fn srgb8(&self) -> (Vec<u8>, u64) {
+        let table = srgb_table();
+        let mut clipped = 0u64;
+        let encode = |v: f32, clipped: &mut u64| {
+            *clipped += u64::from(v > 1.0);
+            table[(v.clamp(0.0, 1.0) * 65535.0 + 0.5) as usize]
+        };
+        let bytes = if self.main.stride == 1 {
+            let mut out = Vec::with_capacity(self.main.pixels() * 3);
+            for p in self.main.mean.chunks_exact(4) {
+                out.extend_from_slice(&[
+                    encode(p[0], &mut clipped),
+                    encode(p[1], &mut clipped),
+                    encode(p[2], &mut clipped),
+                ]);
+            }
+            out
+        } else {
+            self.linear_rgb().into_iter().map(|v| encode(v, &mut clipped)).collect()
+        };
+        (bytes, clipped)
+    }
+}
+
+/// sRGB bytes by linear value in steps of 2^-16: a step is a twentieth of a grey level where the curve is steepest.
+fn srgb_table() -> &'static [u8] {
+    static TABLE: std::sync::OnceLock<Vec<u8>> = std::sync::OnceLock::new();
+    TABLE.get_or_init(|| {
+        let encode = |v: f64| if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+        (0..=65535).map(|i| (encode(f64::from(i) / 65535.0) * 255.0).round() as u8).collect()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn samples(stride: usize, count: u32, luminances: &[f32], m2: f32) -> Samples {
+        let mean = luminances.iter().flat_map(|&l| [l, l, l, 0.5]).collect();
+        let width = 2;
+        Samples { width, height: luminances.len() / width, stride, count, mean, m2: vec![m2; luminances.len()] }
+    }
+
+    #[test]
+    fn noise_is_the_standard_error_of_the_mean() {
+        // Four samples with a variance of 0.09 a sample: the standard error is 0.3 / 2, relative to a mean of 0.5.
+        let main = samples(1, 4, &[0.5; 4], 3.0 * 0.09);
+        let error = Film { size: [2, 2], main, opacity_threshold: 1.0, ..Film::default() }.error();
+        assert!((error.total - 0.3).abs() < 1e-6, "{error:?}");
+        assert_eq!(error.discretisation, None);
+    }
+
+    #[test]
+    fn the_control_tells_discretisation_from_noise() {
+        let main = samples(1, 100, &[0.5; 4], 0.0);
+        let control =
+            Samples { width: 1, height: 1, stride: 2, count: 1, mean: vec![0.6, 0.6, 0.6, 0.5], m2: vec![0.0] };
+        let film = Film { size: [2, 2], main, control: Some(control), opacity_threshold: 1.0, ..Film::default() };
+        let error = film.error();
+        assert!(
+            (error.discretisation.unwrap_or(0.0) - 0.2).abs() < 1e-5 && (error.total - 0.2).abs() < 1e-5,
+            "{error:?}"
+        );
+    }
+
+    #[test]
+    fn srgb_is_the_standard_curve() {
+        for (linear, byte) in [(0.0, 0), (0.0031308, 10), (0.2140411, 128), (0.5, 188), (1.0, 255), (7.0, 255)] {
+            let film = Film { size: [2, 1], main: samples(1, 1, &[linear; 2], 0.0), ..Film::default() };
+            assert_eq!(film.srgb8().0[0], byte, "at {linear}");
+        }
+    }
+}

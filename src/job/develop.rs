@@ -1,0 +1,53 @@
+//! Develops a job's snapshots into frames: error, tone and PNG, on the runtime's blocking threads, newest first.
+
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Weak};
+
+use super::{Engine, Job, Snapshot, State};
+use crate::error::Error;
+use crate::frame;
+
+/// Runs as long as the job is kept. Snapshots that a newer one overtook are never developed. The one place that tells the
+/// engine that a job has ended.
+pub(super) async fn frames(job: Weak<Job>, engine: Engine) {
+    let Some((mut snapshots, mut updates)) = job.upgrade().map(|j| (j.snapshots.subscribe(), j.watch())) else {
+        return;
+    };
+    // A snapshot may have come before this task's first turn.
+    snapshots.mark_changed();
+    let mut developed_last: Option<Arc<Snapshot>> = None;
+    loop {
+        tokio::select! {
+            changed = snapshots.changed() => if changed.is_err() { return },
+            changed = updates.changed() => if changed.is_err() { return },
+        }
+        let Some(job) = job.upgrade() else { return };
+        if matches!(updates.borrow_and_update().state, State::Cancelled | State::Failed) {
+            engine.ended(&job);
+            return;
+        }
+        let Some(snapshot) = snapshots.borrow_and_update().clone() else { continue };
+        if developed_last.as_ref().is_some_and(|last| Arc::ptr_eq(last, &snapshot)) {
+            continue;
+        }
+        developed_last = Some(snapshot.clone());
+        let developed = tokio::task::spawn_blocking({
+            let snapshot = snapshot.clone();
+            move || {
+                let error = snapshot.film.error();
+                frame::png(&snapshot.film, &error).map(|(png, clipped)| (png, error, clipped))
+            }
+        })
+        .await;
+        job.developing.store(false, Ordering::Release);
+        match developed {
+            Ok(Ok((png, error, clipped))) => {
+                if job.publish(&snapshot, png, error, clipped) {
+                    engine.ended(&job);
+                }
+            }
+            Ok(Err(error)) => drop(job.fail(&error)),
+            Err(panic) => drop(job.fail(&Error::internal(panic))),
+        }
+    }
+}

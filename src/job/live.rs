@@ -1,0 +1,326 @@
+//! A job on the device thread: what it does with a turn, and what all jobs there share.
+
+use std::collections::HashMap;
+use std::rc::Rc;
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Weak};
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+
+use super::field_run::FieldRun;
+use super::view_run::{Pass, ViewRun};
+use super::{Job, Snapshot};
+use crate::device::program::Variant;
+use crate::device::{Buffer, Device};
+use crate::error::{Error, Result};
+use crate::film::Film;
+use crate::scene::{Scene, Subject};
+use crate::technique;
+use crate::volume::Volume;
+
+/// A turn on the device: long enough to be worth a launch, short enough that nobody waits and a cancel is felt at once.
+const SLICE: Duration = Duration::from_millis(20);
+/// Frames are not made faster than the eye sees: encoding takes cores that the device wants.
+const FRAME_EVERY: Duration = Duration::from_millis(30);
+/// Device memory for volumes that no job uses just now.
+const IDLE_VOLUME_BYTES: usize = 1 << 30;
+
+/// Everything on the device that outlives a job.
+pub(super) struct DeviceContext {
+    pub device: Device,
+    volumes: HashMap<usize, (Weak<Volume>, Rc<Buffer>)>,
+    /// Rays or histories per millisecond, by kernel variant.
+    speed: HashMap<Variant, f64>,
+}
+
+impl DeviceContext {
+    /// Builds every variant of every technique and launches each once on a tiny case: PoCL compiles at the first launch.
+    pub fn warm(mut device: Device) -> Result<Self> {
+        let started = Instant::now();
+        for t in technique::ALL {
+            let source = (t.source)();
+            for variant in (source.variants)() {
+                device.build(&source, &variant)?;
+                // Zeroed buffers ask for an image of no pixels or a launch of no histories: compiled, and nothing done.
+                let zero: Vec<Buffer> = (0..7).map(|_| device.upload(&[0; 512], 0)).collect::<Result<_>>()?;
+                let arguments: Vec<&Buffer> = zero.iter().take(source.arguments).collect();
+                device.run(&variant, &arguments, 0, 1)?;
+            }
+        }
+        tracing::info!(ms = started.elapsed().as_millis() as u64, lanes = device.info().lanes, "kernels are warm");
+        Ok(Self { device, volumes: HashMap::new(), speed: HashMap::new() })
+    }
+
+    /// The volume on the device, uploaded at first use.
+    pub fn volume(&mut self, volume: &Arc<Volume>) -> Result<Rc<Buffer>> {
+        let key = Arc::as_ptr(volume) as usize;
+        if let Some((weak, buffer)) = self.volumes.get(&key)
+            && weak.strong_count() > 0
+        {
+            return Ok(buffer.clone());
+        }
+        let buffer = Rc::new(self.device.upload(volume.voxels().as_bytes(), 8)?);
+        self.volumes.insert(key, (Arc::downgrade(volume), buffer.clone()));
+        self.tidy();
+        Ok(buffer)
+    }
+
+    /// Lets go of volumes that are gone from the host, and of idle ones past the limit.
+    pub fn tidy(&mut self) {
+        self.volumes.retain(|_, (weak, _)| weak.strong_count() > 0);
+        let idle = |b: &Rc<Buffer>| Rc::strong_count(b) == 1;
+        let mut bytes: usize = self.volumes.values().filter(|(_, b)| idle(b)).map(|(_, b)| b.len()).sum();
+        self.volumes.retain(|_, (_, buffer)| {
+            let drop = bytes > IDLE_VOLUME_BYTES && idle(buffer);
+            bytes -= if drop { buffer.len() } else { 0 };
+            !drop
+        });
+    }
+
+    /// Work-items, of `width` rays or histories each, that take about `slice`. Unknown variants start small.
+    pub fn items_for(&self, variant: &Variant, slice: Duration, width: usize) -> usize {
+        let per_ms = self.speed.get(variant).copied().unwrap_or(50.0);
+        ((per_ms * slice.as_secs_f64() * 1e3 / width as f64) as usize).max(self.device.info().local_size)
+    }
+
+    /// Learns from a launch. A speed rises at most fourfold at a time, so that one lucky launch makes no long slice.
+    pub fn measured(&mut self, variant: &Variant, items: usize, width: usize, took: Duration) {
+        let now = (items * width) as f64 / (took.as_secs_f64() * 1e3).max(1e-3);
+        let speed = self.speed.entry(*variant).or_insert(now);
+        *speed = if now < *speed { now } else { (0.5 * (*speed + now)).min(4.0 * *speed) };
+    }
+
+    /// Milliseconds that so many rays are likely to take, where the variant has run before.
+    pub fn expected_ms(&self, variant: &Variant, rays: usize) -> Option<f64> {
+        self.speed.get(variant).map(|per_ms| rays as f64 / per_ms)
+    }
+}
+
+/// What a turn came to.
+pub(super) enum Turn {
+    /// More to do.
+    Again,
+    /// The device is through with the job.
+    Over,
+}
+
+/// A job with its buffers.
+pub(super) struct Live {
+    job: Arc<Job>,
+    generation: u64,
+    asked: Instant,
+    started: Instant,
+    scene: Option<Scene>,
+    volume: Option<Arc<Volume>>,
+    field: Option<FieldRun>,
+    /// The field's volume has to be looked at before more is computed.
+    look: bool,
+    result: Option<Value>,
+    view: Option<ViewRun>,
+    /// The picture when the field had half its histories.
+    half: Option<Film>,
+    field_error: Option<f64>,
+    last_frame: Option<Instant>,
+}
+
+impl Live {
+    pub fn new(job: Arc<Job>) -> Self {
+        let now = Instant::now();
+        Self {
+            job,
+            generation: 0,
+            asked: now,
+            started: now,
+            scene: None,
+            volume: None,
+            field: None,
+            look: false,
+            result: None,
+            view: None,
+            half: None,
+            field_error: None,
+            last_frame: None,
+        }
+    }
+
+    pub fn fail(&self, error: Error) {
+        self.job.fail(&error);
+    }
+
+    /// One turn: a slice of the field or of the view.
+    pub fn turn(&mut self, context: &mut DeviceContext) -> Result<Turn> {
+        if self.job.is_cancelled() || self.job.state().is_terminal() {
+            return Ok(Turn::Over);
+        }
+        self.follow_camera(context)?;
+        if !self.look && self.field.as_ref().is_some_and(|f| !f.is_done()) {
+            return self.field_turn(context);
+        }
+        self.view_turn(context)
+    }
+
+    /// The first turn, and after that a newer camera where there is one.
+    fn follow_camera(&mut self, context: &mut DeviceContext) -> Result<()> {
+        let first = self.scene.is_none();
+        {
+            let progress = self.job.lock();
+            if !first && progress.generation == self.generation {
+                return Ok(());
+            }
+            (self.generation, self.asked) = (progress.generation, progress.asked);
+            self.scene = Some(progress.scene.clone());
+        }
+        self.started = Instant::now();
+        self.last_frame = None;
+        self.half = None;
+        self.job.started();
+        let Some(scene) = &self.scene else { return Ok(()) };
+        match (scene.subject(), &self.volume, &mut self.view) {
+            (_, Some(volume), Some(view)) => view.restart(context, scene, volume),
+            (Subject::Volume(volume), _, _) => self.begin_view(context, volume.clone()),
+            (Subject::Field(field), _, _) => {
+                let run = FieldRun::new(context, field)?;
+                self.job.lock().reasons = run.reasons().to_vec();
+                self.field = Some(run);
+                Ok(())
+            }
+        }
+    }
+
+    fn begin_view(&mut self, context: &mut DeviceContext, volume: Arc<Volume>) -> Result<()> {
+        let Some(scene) = &self.scene else { return Ok(()) };
+        let view = ViewRun::new(context, scene, &volume)?;
+        {
+            let mut progress = self.job.lock();
+            progress.reasons = self.field.as_ref().map_or(Vec::new(), |f| f.reasons().to_vec());
+            progress.reasons.extend_from_slice(&view.plan().reasons);
+            progress.counts.non_finite_voxels = volume.non_finite();
+            progress.warnings = warnings(&volume);
+            progress.field = self.field.is_some().then(|| volume.clone());
+        }
+        self.volume = Some(volume);
+        self.view = Some(view);
+        Ok(())
+    }
+
+    fn field_turn(&mut self, context: &mut DeviceContext) -> Result<Turn> {
+        let Some(field) = &mut self.field else { return Ok(Turn::Over) };
+        if field.slice(context, SLICE)? {
+            let (volume, result) = field.finish(context)?;
+            self.result = Some(result);
+            self.look = true;
+            self.begin_view(context, volume)?;
+        }
+        Ok(Turn::Again)
+    }
+
+    fn view_turn(&mut self, context: &mut DeviceContext) -> Result<Turn> {
+        let Some(view) = &mut self.view else { return Ok(Turn::Over) };
+        let Some(pass) = view.slice(context, SLICE)? else { return Ok(Turn::Again) };
+        let unfinished_field = self.field.as_ref().is_some_and(|f| !f.is_done());
+        if unfinished_field {
+            if pass == Pass::Main {
+                self.look_at_field(context)?;
+            }
+            return Ok(Turn::Again);
+        }
+        if pass == Pass::Main && self.view.as_ref().is_some_and(|v| v.samples() == 1) && self.field.is_some() {
+            self.compare_with_half(context)?;
+        }
+        match self.stopped_by(context, pass)? {
+            Some(reason) => {
+                self.snapshot(context, Some(reason))?;
+                Ok(if self.job.leave(self.generation) { Turn::Over } else { Turn::Again })
+            }
+            None => {
+                let due = self.last_frame.is_none_or(|t| t.elapsed() >= FRAME_EVERY);
+                let proper = pass == Pass::Main || self.view.as_ref().is_some_and(|v| v.samples() == 0);
+                if due && proper && !self.job.developing.swap(true, Ordering::AcqRel) {
+                    self.snapshot(context, None)?;
+                }
+                Ok(Turn::Again)
+            }
+        }
+    }
+
+    /// One picture of a field that is still filling; then the field goes on.
+    fn look_at_field(&mut self, context: &mut DeviceContext) -> Result<()> {
+        self.compare_with_half(context)?;
+        self.job.developing.store(true, Ordering::Release);
+        self.snapshot(context, None)?;
+        self.look = false;
+        Ok(())
+    }
+
+    /// The picture against the one of half as many histories: the difference of a mean to that of its first half has the
+    /// variance of the mean itself, so it estimates the picture's standard error.
+    fn compare_with_half(&mut self, context: &mut DeviceContext) -> Result<()> {
+        let Some(view) = &self.view else { return Ok(()) };
+        let film = view.film(context)?;
+        self.field_error = self.half.as_ref().and_then(|half| film.difference(half));
+        self.half = Some(film);
+        Ok(())
+    }
+
+    /// What stops the render now, if anything. The error is looked at after 2, 3, 4, 6, 8, 12, … samples, a fixed order, so
+    /// that the same request stops at the same sample.
+    fn stopped_by(&self, context: &DeviceContext, pass: Pass) -> Result<Option<&'static str>> {
+        let (Some(view), Some(scene)) = (&self.view, &self.scene) else { return Ok(None) };
+        let (samples, budget) = (view.samples(), scene.budget());
+        if pass != Pass::Main {
+            return Ok(None);
+        }
+        if samples >= budget.samples {
+            return Ok(Some("samples"));
+        }
+        if budget.time_ms.is_some_and(|ms| self.started.elapsed().as_millis() >= u128::from(ms)) {
+            return Ok(Some("time"));
+        }
+        let round = samples.is_power_of_two() || (samples % 3 == 0 && (samples / 3).is_power_of_two());
+        if let Some(most) = budget.max_error
+            && samples >= 2
+            && round
+        {
+            let film = Film { field_error: self.field_error, ..view.film(context)? };
+            if film.error().total <= most {
+                return Ok(Some("error"));
+            }
+        }
+        Ok(None)
+    }
+
+    fn snapshot(&mut self, context: &DeviceContext, stopped_by: Option<&'static str>) -> Result<()> {
+        let Some(view) = &self.view else { return Ok(()) };
+        let film = Film { field_error: self.field_error, ..view.film(context)? };
+        let device_time = view.device_time + self.field.as_ref().map_or(Duration::ZERO, |f| f.device_time);
+        let snapshot = Snapshot {
+            film,
+            generation: self.generation,
+            elapsed_ms: self.asked.elapsed().as_secs_f64() * 1e3,
+            device_ms: device_time.as_secs_f64() * 1e3,
+            non_finite_samples: view.non_finite(context)?,
+            result: self.result.clone(),
+            stopped_by,
+        };
+        self.last_frame = Some(Instant::now());
+        self.job.snapshots.send_replace(Some(Arc::new(snapshot)));
+        Ok(())
+    }
+}
+
+/// What a reader should know of the volume, in codes and words.
+fn warnings(volume: &Volume) -> Vec<Value> {
+    let mut warnings: Vec<Value> =
+        volume.notes().iter().map(|n| json!({"code": "volume_note", "message": n})).collect();
+    if volume.non_finite() > 0 {
+        let message = format!(
+            "{} voxels are not finite; they and the cells they touch are rendered as empty",
+            volume.non_finite()
+        );
+        warnings.push(
+            json!({"code": "non_finite_voxels", "message": message, "measured": volume.non_finite(), "bound": 0}),
+        );
+    }
+    warnings
+}

@@ -1,0 +1,413 @@
+//! Renders as jobs: a bounded queue, fair slices on the device thread, cancellation, and the latest frame.
+//!
+//! A [`Job`] is what the HTTP side and the device thread share. The device thread leaves snapshots of the film; a task of
+//! the async runtime develops the newest of them into a frame ([`develop`]); readers watch the latest frame and never hold
+//! anybody up.
+
+mod develop;
+mod engine;
+mod field_run;
+mod live;
+mod view_run;
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+
+use serde::Serialize;
+use serde_json::{Value, json};
+use tokio::sync::watch;
+
+use crate::error::{Error, Result};
+use crate::film::{ErrorEstimate, Film};
+use crate::frame::Frame;
+use crate::scene::Scene;
+use crate::scene::camera::Camera;
+
+pub use engine::{Engine, Readiness};
+
+/// Points of the convergence trace that are kept; past this, every second one is dropped.
+const TRACE_POINTS: usize = 512;
+
+/// Where a render stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum State {
+    /// It waits for its first slice.
+    Queued,
+    /// It takes turns on the device.
+    Running,
+    /// The final frame is there.
+    Done,
+    /// It was cancelled.
+    Cancelled,
+    /// It failed; the resource says why.
+    Failed,
+}
+
+impl State {
+    /// Whether nothing more will come, unless a new camera sets a done render running again.
+    pub fn is_terminal(self) -> bool {
+        matches!(self, Self::Done | Self::Cancelled | Self::Failed)
+    }
+}
+
+/// One point of the convergence trace.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct TracePoint {
+    /// Milliseconds since the render or its newest camera was asked for.
+    pub elapsed_ms: f64,
+    /// Samples per pixel of this frame.
+    pub samples: u32,
+    /// Its error.
+    pub error: f64,
+    /// Pixels a sample of this frame stands for, along a side.
+    pub stride: u32,
+}
+
+/// Times of a render, in milliseconds since it or its newest camera was asked for.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct Timings {
+    /// Until its first slice.
+    pub queued_ms: Option<f64>,
+    /// Until its first frame.
+    pub first_frame_ms: Option<f64>,
+    /// Time the device worked for it.
+    pub device_ms: f64,
+    /// Until its newest frame.
+    pub elapsed_ms: f64,
+}
+
+/// Counts of what must never be silent.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct Counts {
+    /// Samples that were not finite; each was taken as black.
+    pub non_finite_samples: u64,
+    /// Voxels of the volume that are not finite; they are rendered as empty.
+    pub non_finite_voxels: u64,
+    /// Channel values above 1 that the newest frame's PNG clips (the EXR has them).
+    pub clipped_values: u64,
+}
+
+/// What the watchers of a job see: its state and its latest frame.
+#[derive(Debug, Clone)]
+pub struct Update {
+    /// Where it stands.
+    pub state: State,
+    /// The latest frame, if there is one.
+    pub frame: Option<Arc<Frame>>,
+}
+
+/// What the device thread hands to the developer of a job's frames.
+pub(crate) struct Snapshot {
+    pub film: Film,
+    pub generation: u64,
+    pub elapsed_ms: f64,
+    pub device_ms: f64,
+    pub non_finite_samples: u64,
+    pub result: Option<Value>,
+    /// What stopped the render, on the final snapshot.
+    pub stopped_by: Option<&'static str>,
+}
+
+/// What a new camera means for the engine.
+pub(crate) struct Restart {
+    /// The device thread has left the job and must be given it again.
+    pub again: bool,
+    /// It was done, so it needs a place in the queue again.
+    pub was_done: bool,
+}
+
+/// What changes while a job lives. One lock, held for moments.
+pub(crate) struct Progress {
+    pub state: State,
+    /// Counts cameras: work for an older one is thrown away.
+    pub generation: u64,
+    /// When the render, or its newest camera, was asked for.
+    pub asked: Instant,
+    pub scene: Scene,
+    /// Whether the engine holds the job; a new camera for one that it does not hold is submitted again.
+    pub in_engine: bool,
+    pub reasons: Vec<String>,
+    pub warnings: Vec<Value>,
+    pub trace: Vec<TracePoint>,
+    pub timings: Timings,
+    pub counts: Counts,
+    pub samples: u32,
+    pub error: Option<ErrorEstimate>,
+    pub stopped_by: Option<&'static str>,
+    pub failure: Option<String>,
+    pub result: Option<Value>,
+    pub film: Option<Arc<Film>>,
+    pub field: Option<Arc<crate::volume::Volume>>,
+    pub sequence: u64,
+}
+
+/// One render.
+pub struct Job {
+    id: String,
+    request: Value,
+    created_unix_s: u64,
+    cancelled: AtomicBool,
+    /// Set while a snapshot is being developed: the device thread skips snapshots that nobody could use.
+    pub(crate) developing: AtomicBool,
+    progress: Mutex<Progress>,
+    updates: watch::Sender<Update>,
+    pub(crate) snapshots: watch::Sender<Option<Arc<Snapshot>>>,
+}
+
+impl Job {
+    pub(crate) fn new(request: Value, scene: Scene) -> Arc<Self> {
+        let progress = Progress {
+            state: State::Queued,
+            generation: 0,
+            asked: Instant::now(),
+            scene,
+            in_engine: true,
+            reasons: Vec::new(),
+            warnings: Vec::new(),
+            trace: Vec::new(),
+            timings: Timings::default(),
+            counts: Counts::default(),
+            samples: 0,
+            error: None,
+            stopped_by: None,
+            failure: None,
+            result: None,
+            film: None,
+            field: None,
+            sequence: 0,
+        };
+        Arc::new(Self {
+            id: uuid::Uuid::new_v4().simple().to_string(),
+            request,
+            created_unix_s: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs()),
+            cancelled: AtomicBool::new(false),
+            developing: AtomicBool::new(false),
+            progress: Mutex::new(progress),
+            updates: watch::Sender::new(Update { state: State::Queued, frame: None }),
+            snapshots: watch::Sender::new(None),
+        })
+    }
+
+    /// The render's id.
+    pub fn id(&self) -> &str {
+        &self.id
+    }
+
+    /// A poisoned lock is taken over: every change under it is a plain assignment, so nothing is ever half done.
+    pub(crate) fn lock(&self) -> MutexGuard<'_, Progress> {
+        self.progress.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+
+    /// A camera for this job's scene, from the body of `PUT …/camera`.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the field.
+    pub fn camera_from_json(&self, body: &Value) -> Result<Camera> {
+        self.lock().scene.camera_from_json(body)
+    }
+
+    /// Where it stands.
+    pub fn state(&self) -> State {
+        self.lock().state
+    }
+
+    /// Its state and latest frame, and each change of them.
+    pub fn watch(&self) -> watch::Receiver<Update> {
+        self.updates.subscribe()
+    }
+
+    /// The newest film, for formats that are made on demand.
+    pub fn film(&self) -> Option<(Arc<Film>, ErrorEstimate)> {
+        let progress = self.lock();
+        Some((progress.film.clone()?, progress.error?))
+    }
+
+    /// The grid of a field technique, if the render has one and it has started.
+    pub fn field(&self) -> Option<Arc<crate::volume::Volume>> {
+        self.lock().field.clone()
+    }
+
+    pub(crate) fn is_cancelled(&self) -> bool {
+        self.cancelled.load(Ordering::Acquire)
+    }
+
+    /// Asks for the job to end; the device leaves it at its next slice. Says whether it was still going.
+    pub(crate) fn cancel(&self) -> bool {
+        self.cancelled.store(true, Ordering::Release);
+        self.end(State::Cancelled, None)
+    }
+
+    pub(crate) fn fail(&self, error: &Error) -> bool {
+        // An internal error's text is for the log; a client learns that it happened.
+        let words = match error {
+            Error::Internal(cause) => {
+                tracing::error!(render = %self.id, %cause, "render failed");
+                "the render failed on the server".to_owned()
+            }
+            other => other.to_string(),
+        };
+        self.end(State::Failed, Some(words))
+    }
+
+    fn end(&self, state: State, failure: Option<String>) -> bool {
+        let mut progress = self.lock();
+        if progress.state.is_terminal() {
+            return false;
+        }
+        progress.state = state;
+        progress.failure = failure;
+        progress.in_engine = false;
+        self.updates.send_modify(|u| u.state = state);
+        true
+    }
+
+    /// Sets the state to running; the first time notes how long the job waited.
+    pub(crate) fn started(&self) {
+        let mut progress = self.lock();
+        if progress.state == State::Queued {
+            progress.state = State::Running;
+            progress.timings.queued_ms = Some(progress.asked.elapsed().as_secs_f64() * 1e3);
+            self.updates.send_modify(|u| u.state = State::Running);
+        }
+    }
+
+    /// Puts a new camera in and forgets what was gathered for the old one.
+    ///
+    /// # Errors
+    /// [`Error::Conflict`] for a render that was cancelled or failed.
+    pub(crate) fn restart(&self, camera: Camera) -> Result<Restart> {
+        let mut progress = self.lock();
+        if matches!(progress.state, State::Cancelled | State::Failed) {
+            return Err(Error::Conflict("this render was cancelled or has failed; post a new one".into()));
+        }
+        progress.scene.set_camera(camera);
+        progress.generation += 1;
+        progress.asked = Instant::now();
+        progress.trace.clear();
+        progress.timings = Timings::default();
+        progress.stopped_by = None;
+        let again = !progress.in_engine;
+        progress.in_engine = true;
+        let was_done = progress.state == State::Done;
+        if was_done {
+            progress.state = State::Queued;
+        }
+        let state = progress.state;
+        self.updates.send_modify(|u| u.state = state);
+        Ok(Restart { again, was_done })
+    }
+
+    /// The device thread is through with the job for the camera of `generation`. `false` when there is a newer camera, so
+    /// that it has to go on.
+    pub(crate) fn leave(&self, generation: u64) -> bool {
+        let mut progress = self.lock();
+        let newest = progress.generation == generation;
+        progress.in_engine &= !newest;
+        newest
+    }
+
+    /// Publishes a frame of `snapshot`, and with the final one of the newest camera ends the job. `true` when it ended.
+    pub(crate) fn publish(&self, snapshot: &Snapshot, png: Vec<u8>, error: ErrorEstimate, clipped: u64) -> bool {
+        let mut progress = self.lock();
+        if progress.state.is_terminal() || snapshot.generation != progress.generation {
+            return false;
+        }
+        let ends = snapshot.stopped_by.is_some();
+        progress.sequence += 1;
+        progress.samples = snapshot.film.main.count;
+        progress.error = Some(error);
+        progress.film = Some(Arc::new(snapshot.film.clone()));
+        progress.counts.clipped_values = clipped;
+        progress.counts.non_finite_samples = snapshot.non_finite_samples;
+        progress.stopped_by = snapshot.stopped_by;
+        progress.timings.elapsed_ms = snapshot.elapsed_ms;
+        progress.timings.device_ms = snapshot.device_ms;
+        let now = progress.asked.elapsed().as_secs_f64() * 1e3;
+        progress.timings.first_frame_ms.get_or_insert(now);
+        if let Some(result) = &snapshot.result {
+            progress.result = Some(result.clone());
+        }
+        if progress.trace.len() >= TRACE_POINTS {
+            let mut index = 0;
+            progress.trace.retain(|_| {
+                index += 1;
+                index % 2 == 1
+            });
+        }
+        progress.trace.push(TracePoint {
+            elapsed_ms: snapshot.elapsed_ms,
+            samples: snapshot.film.main.count,
+            error: error.total,
+            stride: snapshot.film.main.stride as u32,
+        });
+        if ends {
+            progress.state = State::Done;
+        }
+        let frame = Arc::new(Frame {
+            sequence: progress.sequence,
+            etag: crate::frame::etag(&png),
+            png: png.into(),
+            samples: snapshot.film.main.count,
+            error,
+            elapsed_ms: snapshot.elapsed_ms,
+            device_ms: snapshot.device_ms,
+            is_final: ends,
+        });
+        self.updates.send_replace(Update { state: progress.state, frame: Some(frame) });
+        ends
+    }
+
+    /// Bytes held for readers.
+    pub(crate) fn bytes(&self) -> usize {
+        let frame = self.updates.borrow().frame.as_ref().map_or(0, |f| f.png.len());
+        let progress = self.lock();
+        frame
+            + progress.film.as_ref().map_or(0, |f| f.bytes())
+            + progress.field.as_ref().map_or(0, |f| f.bytes() as usize)
+    }
+
+    /// A line of `GET /v1/renders`.
+    pub fn summary(&self) -> Value {
+        let p = self.lock();
+        json!({
+            "id": self.id, "state": p.state, "technique": p.scene.technique().name, "image": p.scene.image(),
+            "samples": p.samples, "error": p.error.map(|e| e.total), "created_unix_s": self.created_unix_s,
+        })
+    }
+
+    /// The render resource.
+    pub fn resource(&self) -> Value {
+        let p = self.lock();
+        let path = |rest: &str| format!("/v1/renders/{}{rest}", self.id);
+        json!({
+            "id": self.id,
+            "state": p.state,
+            "technique": p.scene.technique().name,
+            "request": self.request,
+            "camera": p.scene.camera().to_json(),
+            "image": {"width": p.scene.image()[0], "height": p.scene.image()[1]},
+            "plan": {"technique": p.scene.technique().name, "reasons": p.reasons, "budget": {
+                "samples": p.scene.budget().samples, "time_ms": p.scene.budget().time_ms, "max_error": p.scene.budget().max_error}},
+            "samples": p.samples,
+            "error": p.error.map(|e| e.total),
+            "error_parts": p.error,
+            "stopped_by": p.stopped_by,
+            "failure": p.failure,
+            "timings": p.timings,
+            "counts": p.counts,
+            "warnings": p.warnings,
+            "trace": p.trace,
+            "result": p.result,
+            "created_unix_s": self.created_unix_s,
+            "links": {"self": path(""), "frames": path("/frames"), "png": path("/frame.png"), "exr": path("/frame.exr"),
+                "events": path("/events"), "convergence": path("/convergence.svg"), "camera": path("/camera"), "field": path("/field")},
+        })
+    }
+
+    /// Its convergence trace.
+    pub fn trace(&self) -> Vec<TracePoint> {
+        self.lock().trace.clone()
+    }
+}
