@@ -1,0 +1,225 @@
+//! `/openapi.json`, made from one table of operations and the very schemas that bodies are checked against, and `/docs`.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::{Path, State};
+use axum::http::header;
+use axum::response::{IntoResponse, Redirect, Response};
+use serde_json::{Map, Value, json};
+
+use super::App;
+use crate::error::{Error, Result};
+use crate::request::{CameraRequest, schema_of};
+use crate::scene;
+use crate::volume::VolumeInfo;
+
+/// One operation: method, path, words, body, the answers that are not problems, and the problems.
+struct Operation {
+    method: &'static str,
+    path: &'static str,
+    words: &'static str,
+    body: Body,
+    answers: &'static [(u16, &'static str, &'static str)],
+    problems: &'static [u16],
+}
+
+enum Body {
+    None,
+    Json(&'static str),
+    Bytes,
+}
+
+const JSON: &str = "application/json";
+const RENDER: &[u16] = &[400, 406, 408, 413, 415, 422, 429, 503];
+
+const fn get(
+    path: &'static str,
+    words: &'static str,
+    answers: &'static [(u16, &'static str, &'static str)],
+    problems: &'static [u16],
+) -> Operation {
+    Operation { method: "get", path, words, body: Body::None, answers, problems }
+}
+
+const fn delete(
+    path: &'static str,
+    words: &'static str,
+    answers: &'static [(u16, &'static str, &'static str)],
+    problems: &'static [u16],
+) -> Operation {
+    Operation { method: "delete", path, words, body: Body::None, answers, problems }
+}
+
+const OPERATIONS: &[Operation] = &[
+    Operation {
+        method: "post",
+        path: "/v1/renders",
+        words: "Start a render; the answer is chosen by Accept",
+        body: Body::Json("RenderRequest"),
+        answers: &[
+            (202, JSON, "The render resource; Location names it"),
+            (200, "image/png", "The final frame"),
+            (200, "image/x-exr", "The final frame in linear floats"),
+            (200, "multipart/x-mixed-replace", "The frames as they come"),
+        ],
+        problems: RENDER,
+    },
+    get("/v1/renders", "The renders that are kept, newest first", &[(200, JSON, "A list of summaries")], &[]),
+    get(
+        "/v1/renders/{id}",
+        "State, plan, samples, error, timings, what stopped it, the convergence trace",
+        &[(200, JSON, "The render resource")],
+        &[404],
+    ),
+    delete("/v1/renders/{id}", "Cancel; the resource stays readable", &[(200, JSON, "The render resource")], &[404]),
+    Operation {
+        method: "put",
+        path: "/v1/renders/{id}/camera",
+        words: "A new camera; what was gathered is dropped, the newest camera supersedes any that wait",
+        body: Body::Json("Camera"),
+        answers: &[(200, JSON, "The camera in force")],
+        problems: &[400, 404, 409, 413, 415, 422, 429, 503],
+    },
+    get(
+        "/v1/renders/{id}/frames",
+        "The frames as they come, each with X-Cloudchamber-{Samples,Error,Elapsed-Ms,Final}; ends after the final one",
+        &[(200, "multipart/x-mixed-replace", "PNG frames")],
+        &[404, 429],
+    ),
+    get(
+        "/v1/renders/{id}/frame.png",
+        "The newest frame; ?wait=final waits for the last",
+        &[(200, "image/png", "A frame with a strong ETag"), (304, "", "Not modified")],
+        &[404, 409, 422, 429],
+    ),
+    get(
+        "/v1/renders/{id}/frame.exr",
+        "The newest frame in linear floats; ?wait=final waits for the last",
+        &[(200, "image/x-exr", "OpenEXR"), (304, "", "Not modified")],
+        &[404, 409, 422, 429],
+    ),
+    get(
+        "/v1/renders/{id}/field",
+        "The grid of a field technique as NRRD",
+        &[(200, "application/octet-stream", "NRRD, raw floats")],
+        &[404],
+    ),
+    get(
+        "/v1/renders/{id}/events",
+        "Server-sent events: progress, final, cancelled, failed; Last-Event-ID resumes",
+        &[(200, "text/event-stream", "Events")],
+        &[404, 429],
+    ),
+    get("/v1/renders/{id}/convergence.svg", "Its error against time", &[(200, "image/svg+xml", "A chart")], &[404]),
+    Operation {
+        method: "post",
+        path: "/v1/volumes",
+        words: "Upload a volume: NIfTI-1, NRRD, or raw with ?dims=…&type=…&spacing=…; the id is the content's hash",
+        body: Body::Bytes,
+        answers: &[(201, JSON, "The new volume"), (200, JSON, "It was there already")],
+        problems: &[400, 408, 413, 415, 422],
+    },
+    get("/v1/volumes", "Uploaded and built-in volumes", &[(200, JSON, "A list")], &[]),
+    get("/v1/volumes/{id}", "Size, spacing, range, histogram", &[(200, JSON, "The volume")], &[404]),
+    delete(
+        "/v1/volumes/{id}",
+        "Forget an uploaded volume; renders that use it go on",
+        &[(204, "", "Gone")],
+        &[404, 409],
+    ),
+    get(
+        "/v1/techniques",
+        "Every technique with the JSON Schema of its parameters and an example",
+        &[(200, JSON, "A list")],
+        &[],
+    ),
+    get("/v1/device", "The OpenCL device in use, its limits and its lanes", &[(200, JSON, "The device")], &[503]),
+    get("/healthz", "The process lives", &[(200, JSON, "It does")], &[]),
+    get(
+        "/readyz",
+        "Kernels are built, there is room in the queue, the server is not draining",
+        &[(200, JSON, "Ready")],
+        &[503],
+    ),
+    get("/metrics", "Prometheus metrics", &[(200, "text/plain", "Metrics")], &[]),
+    get("/openapi.json", "This document", &[(200, JSON, "OpenAPI 3.1")], &[]),
+];
+
+fn describe(operation: &Operation) -> Value {
+    let mut responses = Map::new();
+    for (status, media, words) in operation.answers {
+        let entry = responses.entry(status.to_string()).or_insert_with(|| json!({"description": words, "content": {}}));
+        if !media.is_empty() {
+            entry["content"][*media] = json!({});
+        }
+    }
+    for status in operation.problems.iter().chain([&401, &500]) {
+        responses.insert(status.to_string(), json!({"$ref": "#/components/responses/Problem"}));
+    }
+    let mut described = json!({"summary": operation.words, "responses": responses});
+    let names = operation.path.split(['{', '}']).skip(1).step_by(2);
+    let path_parameters =
+        names.map(|n| json!({"name": n, "in": "path", "required": true, "schema": {"type": "string"}}));
+    let mut parameters: Vec<Value> = path_parameters.collect();
+    let mut query = |name: &str, schema: Value| parameters.push(json!({"name": name, "in": "query", "schema": schema}));
+    if operation.path.contains("/frame.") {
+        query("wait", json!({"enum": ["final"]}));
+    }
+    match operation.body {
+        Body::None => {}
+        Body::Json(schema) => {
+            let content = json!({JSON: {"schema": {"$ref": format!("#/components/schemas/{schema}")}}});
+            described["requestBody"] = json!({"required": true, "content": content});
+        }
+        Body::Bytes => {
+            for name in ["dims", "type", "spacing", "endian"] {
+                query(name, json!({"type": "string"}));
+            }
+            described["requestBody"] = json!({"required": true, "content": {"application/octet-stream": {}}});
+        }
+    }
+    described["parameters"] = parameters.into();
+    described
+}
+
+/// `GET /openapi.json`.
+pub(super) async fn document(State(app): State<App>) -> Json<Value> {
+    let mut paths = Map::new();
+    for operation in OPERATIONS {
+        let path = paths.entry(operation.path).or_insert_with(|| json!({}));
+        path[operation.method] = describe(operation);
+    }
+    let problem = json!({"type": "object", "properties": {
+        "type": {"type": "string"}, "title": {"type": "string"}, "status": {"type": "integer"}, "detail": {"type": "string"},
+        "errors": {"type": "array", "items": {"type": "object", "properties": {
+            "pointer": {"type": "string"}, "detail": {"type": "string"}, "permitted": {"type": "string"}}}}}});
+    Json(json!({
+        "openapi": "3.1.0",
+        "info": {"title": "Cloudchamber", "version": env!("CARGO_PKG_VERSION"), "description": env!("CARGO_PKG_DESCRIPTION")},
+        "paths": paths,
+        "components": {
+            "schemas": {
+                "RenderRequest": scene::schema(&app.limits), "Camera": schema_of::<CameraRequest>(),
+                "Volume": schema_of::<VolumeInfo>(), "Problem": problem,
+            },
+            "responses": {"Problem": {
+                "description": "RFC 9457 problem document",
+                "content": {"application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}}}},
+        },
+    }))
+}
+
+/// `GET /docs`: to the page itself, so that its relative links work.
+pub(super) async fn docs_root() -> Redirect {
+    Redirect::permanent("/docs/")
+}
+
+/// The readable form of the document.
+pub(super) async fn docs(path: Option<Path<String>>) -> Result<Response> {
+    let name = path.map_or(String::new(), |Path(p)| p);
+    let config = Arc::new(utoipa_swagger_ui::Config::from("/openapi.json"));
+    let file = utoipa_swagger_ui::serve(&name, config).map_err(Error::internal)?;
+    let file = file.ok_or_else(|| Error::NotFound { what: "page", id: name.chars().take(100).collect() })?;
+    Ok(([(header::CONTENT_TYPE, file.content_type)], file.bytes.into_owned()).into_response())
+}

@@ -1,0 +1,78 @@
+//! The table of routes and the layers around them.
+
+use axum::Router;
+use axum::extract::MatchedPath;
+use axum::http::{HeaderValue, Method, Request, header};
+use axum::middleware::{self, Next};
+use axum::response::Response;
+use axum::routing::{get, post, put};
+use tower_http::catch_panic::CatchPanicLayer;
+use tower_http::compression::CompressionLayer;
+use tower_http::compression::predicate::{DefaultPredicate, NotForContentType, Predicate};
+use tower_http::cors::{AllowOrigin, Any, CorsLayer};
+use tower_http::trace::TraceLayer;
+
+use super::guard::{self, Tokens};
+use super::{App, info, openapi, problem, renders, streams, viewer, volumes};
+use crate::error::{Error, Result};
+
+/// Every route with its layers.
+pub(super) fn router(app: App, tokens: Tokens, origins: &[String]) -> Result<Router> {
+    let api = Router::new()
+        .route("/v1/renders", post(renders::create).get(renders::list))
+        .route("/v1/renders/{id}", get(renders::show).delete(renders::cancel))
+        .route("/v1/renders/{id}/camera", put(renders::set_camera))
+        .route("/v1/renders/{id}/frames", get(streams::frames))
+        .route("/v1/renders/{id}/frame.png", get(renders::frame_png))
+        .route("/v1/renders/{id}/frame.exr", get(renders::frame_exr))
+        .route("/v1/renders/{id}/field", get(renders::field))
+        .route("/v1/renders/{id}/events", get(streams::events))
+        .route("/v1/renders/{id}/convergence.svg", get(renders::convergence))
+        .route("/v1/volumes", post(volumes::create).get(volumes::list))
+        .route("/v1/volumes/{id}", get(volumes::show).delete(volumes::delete))
+        .route("/v1/techniques", get(info::techniques))
+        .route("/v1/device", get(info::device))
+        .route("/healthz", get(info::healthz))
+        .route("/readyz", get(info::readyz))
+        .route("/metrics", get(info::metrics))
+        .route("/openapi.json", get(openapi::document))
+        .route("/docs", get(openapi::docs_root))
+        .route("/docs/", get(openapi::docs))
+        .route("/docs/{*path}", get(openapi::docs))
+        .fallback(viewer::file)
+        .method_not_allowed_fallback(|| async { Error::MethodNotAllowed })
+        .with_state(app);
+    // Pictures are compressed already; a compressed stream would hold frames back.
+    let compressible = DefaultPredicate::new()
+        .and(NotForContentType::const_new("multipart/x-mixed-replace"))
+        .and(NotForContentType::const_new("application/octet-stream"));
+    let layered = api
+        .layer(middleware::from_fn(count))
+        .layer(middleware::from_fn_with_state(tokens, guard::check))
+        .layer(CompressionLayer::new().compress_when(compressible))
+        .layer(CatchPanicLayer::custom(problem::from_panic))
+        .layer(TraceLayer::new_for_http().on_failure(()));
+    if origins.is_empty() { Ok(layered) } else { Ok(layered.layer(cors(origins)?)) }
+}
+
+fn cors(origins: &[String]) -> Result<CorsLayer> {
+    let parse = |o: &String| {
+        o.parse::<HeaderValue>().map_err(|_| Error::internal(format!("--cors-origin: '{o}' is not an origin")))
+    };
+    let origins = origins.iter().map(parse).collect::<Result<Vec<_>>>()?;
+    Ok(CorsLayer::new()
+        .allow_origin(AllowOrigin::list(origins))
+        .allow_methods([Method::GET, Method::POST, Method::PUT, Method::DELETE])
+        .allow_headers([header::CONTENT_TYPE, header::AUTHORIZATION, header::ACCEPT, header::IF_NONE_MATCH])
+        .expose_headers(Any))
+}
+
+/// Counts requests by route and status. The route's pattern, not its path: a label must not grow with the ids.
+async fn count(path: Option<MatchedPath>, request: Request<axum::body::Body>, next: Next) -> Response {
+    let method = request.method().to_string();
+    let response = next.run(request).await;
+    let route = path.map_or_else(|| "static".to_owned(), |p| p.as_str().to_owned());
+    let labels = [("method", method), ("route", route), ("status", response.status().as_u16().to_string())];
+    metrics::counter!("cloudchamber_http_requests_total", &labels).increment(1);
+    response
+}

@@ -1,0 +1,136 @@
+//! Streams of a render: frames as `multipart/x-mixed-replace`, and server-sent events. Both show the latest and skip what a
+//! slow reader missed, so that nothing grows; both end with the render or with the server.
+
+use std::convert::Infallible;
+use std::sync::Arc;
+
+use axum::body::{Body, Bytes};
+use axum::extract::{Path, State};
+use axum::http::{HeaderMap, header};
+use axum::response::sse::{Event, KeepAlive, Sse};
+use axum::response::{IntoResponse, Response};
+use futures_util::stream::{self, Stream, StreamExt};
+use serde_json::json;
+use tokio::sync::OwnedSemaphorePermit;
+use tokio::sync::watch;
+use tokio_util::sync::CancellationToken;
+
+use super::App;
+use super::renders::{CancelOnDrop, find, frame_headers};
+use crate::error::Result;
+use crate::frame::Frame;
+use crate::job::{Job, State as JobState, Update};
+
+/// A reader of a job's updates that knows what it has shown.
+struct Reader {
+    job: Arc<Job>,
+    updates: watch::Receiver<Update>,
+    stop: CancellationToken,
+    shown: u64,
+    over: bool,
+    _permit: OwnedSemaphorePermit,
+    _guard: Option<CancelOnDrop>,
+}
+
+impl Reader {
+    fn new(app: &App, job: Arc<Job>, shown: u64, guard: Option<CancelOnDrop>) -> Result<Self> {
+        let _permit = app.stream_permit()?;
+        metrics::counter!("cloudchamber_streams_total").increment(1);
+        Ok(Self { updates: job.watch(), job, stop: app.stop.clone(), shown, over: false, _permit, _guard: guard })
+    }
+
+    /// The next update with a frame not shown yet or an end; `None` after the end or when the server stops.
+    async fn next(&mut self) -> Option<Update> {
+        while !self.over {
+            let update = self.updates.borrow_and_update().clone();
+            let fresh = update.frame.as_ref().is_some_and(|f| f.sequence > self.shown);
+            self.over = update.state.is_terminal();
+            if fresh || self.over {
+                self.shown = update.frame.as_ref().map_or(self.shown, |f| f.sequence);
+                return Some(update);
+            }
+            tokio::select! {
+                changed = self.updates.changed() => changed.ok()?,
+                () = self.stop.cancelled() => return None,
+            }
+        }
+        None
+    }
+}
+
+const OPENING: &[u8] = b"--frame\r\n";
+
+/// A part, and the boundary behind it at once: a browser shows a part when it sees that it is over.
+fn part(frame: &Frame, last: bool) -> Bytes {
+    let mut bytes = Vec::with_capacity(frame.png.len() + 256);
+    bytes.extend_from_slice(b"Content-Type: image/png\r\n");
+    bytes.extend_from_slice(format!("Content-Length: {}\r\n", frame.png.len()).as_bytes());
+    for (name, value) in frame_headers(frame) {
+        bytes.extend_from_slice(format!("{name}: {value}\r\n").as_bytes());
+    }
+    bytes.extend_from_slice(b"\r\n");
+    bytes.extend_from_slice(&frame.png);
+    bytes.extend_from_slice(if last { b"\r\n--frame--\r\n" } else { b"\r\n--frame\r\n" });
+    bytes.into()
+}
+
+fn multipart(reader: Reader) -> impl Stream<Item = std::result::Result<Bytes, Infallible>> {
+    let mut before = 0;
+    let parts = stream::unfold(reader, |mut reader| async move { reader.next().await.map(|update| (update, reader)) });
+    let parts = parts.filter_map(move |update| {
+        // An end without a new frame: the stream just stops.
+        let fresh = update.frame.filter(|f| f.sequence > before);
+        before = fresh.as_ref().map_or(before, |f| f.sequence);
+        let bytes = fresh.map(|f| Ok(part(&f, update.state.is_terminal())));
+        async move { bytes }
+    });
+    stream::once(async { Ok(Bytes::from_static(OPENING)) }).chain(parts)
+}
+
+/// The frames of a job as a response; a render that `fresh`ly belongs to this request ends with it.
+pub(super) fn frames_of(app: &App, job: Arc<Job>, fresh: bool) -> Result<Response> {
+    let guard = fresh.then(|| CancelOnDrop::new(app, &job, true));
+    let reader = Reader::new(app, job, 0, guard)?;
+    let headers =
+        [(header::CONTENT_TYPE, "multipart/x-mixed-replace; boundary=frame"), (header::CACHE_CONTROL, "no-store")];
+    Ok((headers, Body::from_stream(multipart(reader))).into_response())
+}
+
+/// `GET /v1/renders/{id}/frames`.
+pub(super) async fn frames(State(app): State<App>, Path(id): Path<String>) -> Result<Response> {
+    frames_of(&app, find(&app, &id)?, false)
+}
+
+fn event(job: &Job, update: &Update) -> Event {
+    let name = match update.state {
+        JobState::Done => "final",
+        JobState::Cancelled => "cancelled",
+        JobState::Failed => "failed",
+        JobState::Queued | JobState::Running => "progress",
+    };
+    let resource = job.resource();
+    let frame = update.frame.as_ref();
+    let data = json!({
+        "state": update.state,
+        "samples": frame.map_or(0, |f| f.samples),
+        "error": frame.map(|f| f.error.total),
+        "elapsed_ms": frame.map(|f| f.elapsed_ms),
+        "device_ms": frame.map(|f| f.device_ms),
+        "final": frame.is_some_and(|f| f.is_final),
+        "stopped_by": resource["stopped_by"],
+        "failure": resource["failure"],
+    });
+    Event::default().event(name).id(frame.map_or(0, |f| f.sequence).to_string()).data(data.to_string())
+}
+
+/// `GET /v1/renders/{id}/events`; `Last-Event-ID` says what was seen before.
+pub(super) async fn events(State(app): State<App>, Path(id): Path<String>, headers: HeaderMap) -> Result<Response> {
+    let job = find(&app, &id)?;
+    let seen = headers.get("last-event-id").and_then(|v| v.to_str().ok()?.parse().ok()).unwrap_or(0);
+    let reader = Reader::new(&app, job, seen, None)?;
+    let events = stream::unfold(reader, |mut reader| async move {
+        let update = reader.next().await?;
+        Some((Ok::<_, Infallible>(event(&reader.job, &update)), reader))
+    });
+    Ok(Sse::new(events).keep_alive(KeepAlive::default()).into_response())
+}

@@ -1,0 +1,76 @@
+//! `/v1/volumes`: upload, list, show with histogram, delete.
+
+use axum::Json;
+use axum::body::Body;
+use axum::extract::{Path, Query, State};
+use axum::http::{Request, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use percent_encoding::percent_decode_str;
+use serde_json::{Value, json};
+
+use super::{App, problem};
+use crate::error::{Error, Result};
+use crate::volume::{RawQuery, VolumeInfo, builtin};
+
+/// Voxels a side of a built-in when it is only looked up.
+const SHOWN_RESOLUTION: usize = 64;
+
+/// `POST /v1/volumes`.
+pub(super) async fn create(State(app): State<App>, request: Request<Body>) -> Result<Response> {
+    let query: std::result::Result<Query<RawQuery>, _> = Query::try_from_uri(request.uri());
+    let Query(query) =
+        query.map_err(|e| Error::Malformed(format!("{}; permitted: dims, type, spacing, endian", e.body_text())))?;
+    let raw = query.parse()?;
+    let (parts, body) = request.into_parts();
+    refuse_forms(&parts.headers)?;
+    let name = parts.headers.get("x-filename").and_then(|v| v.to_str().ok()).unwrap_or("volume");
+    let name: String =
+        percent_decode_str(name).decode_utf8_lossy().chars().filter(|c| !c.is_control()).take(200).collect();
+    let bytes = problem::read_body(&parts.headers, body, app.limits.max_body_bytes, app.request_timeout).await?;
+    let store = app.store.clone();
+    let (volume, id, new) = tokio::task::spawn_blocking(move || store.insert(bytes.to_vec(), &name, raw))
+        .await
+        .map_err(Error::internal)??;
+    let location = format!("/v1/volumes/{id}");
+    let status = if new { StatusCode::CREATED } else { StatusCode::OK };
+    Ok((status, [(header::LOCATION, location)], Json(VolumeInfo::of_upload(&id, &volume))).into_response())
+}
+
+/// A form's body is not a volume: say so instead of complaining of its bytes.
+fn refuse_forms(headers: &axum::http::HeaderMap) -> Result<()> {
+    let declared = headers.get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok()).unwrap_or_default();
+    // curl's --data-binary says x-www-form-urlencoded unless told otherwise, so that one is let through.
+    if declared.starts_with("multipart/") || declared.starts_with("application/json") {
+        let words =
+            format!("the content type is {declared}; send the file itself as the body, as application/octet-stream");
+        return Err(Error::UnsupportedMediaType(words));
+    }
+    Ok(())
+}
+
+/// `GET /v1/volumes`.
+pub(super) async fn list(State(app): State<App>) -> Result<Json<Value>> {
+    let volumes = tokio::task::spawn_blocking(move || app.store.list()).await.map_err(Error::internal)?;
+    Ok(Json(json!({"volumes": volumes})))
+}
+
+/// `GET /v1/volumes/{id}`, an id or the name of a built-in.
+pub(super) async fn show(State(app): State<App>, Path(id): Path<String>) -> Result<Json<VolumeInfo>> {
+    let info = tokio::task::spawn_blocking(move || {
+        if builtin::NAMES.contains(&id.as_str()) {
+            app.store.builtin_info(&id, SHOWN_RESOLUTION, 0)
+        } else {
+            app.store.info(&id)
+        }
+    });
+    Ok(Json(info.await.map_err(Error::internal)??))
+}
+
+/// `DELETE /v1/volumes/{id}`. Renders that use it go on.
+pub(super) async fn delete(State(app): State<App>, Path(id): Path<String>) -> Result<StatusCode> {
+    if builtin::NAMES.contains(&id.as_str()) {
+        return Err(Error::Conflict("a built-in volume cannot be deleted".into()));
+    }
+    tokio::task::spawn_blocking(move || app.store.delete(&id)).await.map_err(Error::internal)??;
+    Ok(StatusCode::NO_CONTENT)
+}

@@ -1,0 +1,41 @@
+//! Cloudchamber: a server that renders volumes and shows how accurate each picture is and what it cost.
+//!
+//! ```text
+//! HTTP body ─► request ─► scene ─► plan ─► job ─► device ─► film | field ─► frame ─► HTTP stream
+//!            (wire JSON) (valid)  (data)  (queue) (OpenCL)  (sums)         (PNG)
+//! ```
+//!
+//! One direction, no way back: a module may use what stands to its right, never what stands to its left.
+//!
+//! | module | what it is |
+//! |---|---|
+//! | [`config`] | flags and environment: address, folders, limits |
+//! | [`error`] | one error enum; the one place where a status code is chosen |
+//! | [`http`] | routes, content negotiation, problem details, streams, OpenAPI; no physics |
+//! | [`client`] | the command line's side of the HTTP contract |
+//! | [`request`] | wire types and the schemas they are checked against |
+//! | [`scene`] | the validated scene: camera, transfer function, budget |
+//! | [`technique`] | the list of techniques; one file each, which makes plans as data |
+//! | [`volume`] | grids: readers, built-ins, the store |
+//! | [`job`] | queue, fair slices on the device thread, cancellation, the latest frame |
+//! | [`device`] | the only home of OpenCL and of `unsafe`: context, programs, buffers |
+//! | [`chart`] | charts as SVG |
+//! | [`film`] | sums on the host: picture and error |
+//! | [`frame`] | picture to PNG or EXR, with its metadata |
+//!
+//! Kernels: `kernels/<technique>.cl` and `kernels/shared/`. The viewer: `static/`. Tests: `tests/<technique>.rs` and
+//! `tests/{api,stream,faults,viewer,…}.rs`.
+
+pub mod chart;
+pub mod client;
+pub mod config;
+pub mod device;
+pub mod error;
+pub mod film;
+pub mod frame;
+pub mod http;
+pub mod job;
+pub mod request;
+pub mod scene;
+pub mod technique;
+pub mod volume;

@@ -1,0 +1,218 @@
+//! The command line: `serve`, `render`, `device`, `healthcheck`.
+
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use cloudchamber::client::{self, Client};
+use cloudchamber::config::{Config, DeviceArgs, Limits};
+use cloudchamber::error::{Error, Result};
+use cloudchamber::http::Server;
+use cloudchamber::job::{Engine, State};
+use cloudchamber::scene::Scene;
+use cloudchamber::volume::Store;
+use cloudchamber::{device, frame};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::{Value, json};
+
+/// Volume renders as a service: each frame says how accurate it is and what it cost.
+#[derive(Parser)]
+#[command(version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Serve the HTTP API and the viewer
+    Serve(Box<Config>),
+    /// Render a scene (the JSON of POST /v1/renders) to a PNG
+    Render(Box<RenderArgs>),
+    /// Show the OpenCL devices here and the one that would be used
+    Device(DeviceArgs),
+    /// Exit 0 if the server at the address answers
+    Healthcheck {
+        /// Address of the server
+        #[arg(long, env = "CLOUDCHAMBER_LISTEN", default_value = "127.0.0.1:8080")]
+        listen: SocketAddr,
+    },
+}
+
+#[derive(clap::Args)]
+struct RenderArgs {
+    /// The scene, or - for standard input
+    scene: PathBuf,
+    /// Where the PNG goes (an .exr name gives linear floats; local renders only)
+    #[arg(short, long, default_value = "out.png")]
+    output: PathBuf,
+    /// Volume file to look at, in place of the scene's volume
+    #[arg(long)]
+    volume: Option<PathBuf>,
+    /// Let the server at this URL do it
+    #[arg(long, env = "CLOUDCHAMBER_SERVER")]
+    server: Option<String>,
+    /// Bearer token for that server
+    #[arg(long, env = "CLOUDCHAMBER_TOKEN", hide_env_values = true)]
+    token: Option<String>,
+    #[command(flatten)]
+    device: DeviceArgs,
+    #[command(flatten)]
+    limits: Limits,
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let filter = tracing_subscriber::EnvFilter::try_from_env("CLOUDCHAMBER_LOG")
+        .unwrap_or_else(|_| "info,tower_http=warn".into());
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+    match run(cli.command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("cloudchamber: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(command: Command) -> Result<()> {
+    // Before any other thread is there: PoCL reads its cache folder from the environment.
+    let device = match &command {
+        Command::Serve(config) => Some(&config.device),
+        Command::Render(args) => Some(&args.device),
+        Command::Device(device) => Some(device),
+        Command::Healthcheck { .. } => None,
+    };
+    if let Some(device) = device {
+        device::keep_compiled_kernels_in(&device.data_dir().join("kernels"))?;
+    }
+    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().map_err(Error::internal)?;
+    let result = runtime.block_on(async {
+        match command {
+            Command::Serve(config) => serve(&config).await,
+            Command::Render(args) => render(&args).await,
+            Command::Device(args) => show_devices(&args),
+            Command::Healthcheck { listen } => client::healthcheck(&format!("http://{listen}")).await,
+        }
+    });
+    // A blocking task that still encodes a frame for nobody must not hold the exit up.
+    runtime.shutdown_background();
+    result
+}
+
+async fn serve(config: &Config) -> Result<()> {
+    let server = Server::bind(config).await?;
+    println!("Cloudchamber listens on http://{}", server.address()?);
+    let engine = server.engine().clone();
+    tokio::spawn(async move {
+        match engine.ready().await {
+            Ok(info) => println!("ready on {} / {}, {} lanes", info.platform, info.device, info.lanes),
+            Err(error) => eprintln!("cloudchamber: {error}"),
+        }
+    });
+    server.run(stop_signal()).await
+}
+
+/// SIGTERM or Ctrl-C.
+async fn stop_signal() {
+    use tokio::signal::unix::{SignalKind, signal};
+    let interrupt = tokio::signal::ctrl_c();
+    match signal(SignalKind::terminate()) {
+        Ok(mut terminate) => tokio::select! { _ = interrupt => {}, _ = terminate.recv() => {} },
+        Err(_) => drop(interrupt.await),
+    }
+}
+
+fn read_scene(path: &Path) -> Result<Value> {
+    let text =
+        if path == Path::new("-") { std::io::read_to_string(std::io::stdin()) } else { std::fs::read_to_string(path) };
+    let text = text.map_err(|e| Error::Malformed(format!("{}: {e}", path.display())))?;
+    serde_json::from_str(&text).map_err(|e| Error::Malformed(format!("{}: {e}", path.display())))
+}
+
+fn bar(scene: &Value) -> ProgressBar {
+    let samples = scene.pointer("/budget/samples").and_then(Value::as_u64).unwrap_or(16);
+    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} samples  {msg}  {elapsed}");
+    ProgressBar::new(samples).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
+
+async fn render(args: &RenderArgs) -> Result<()> {
+    let mut scene = read_scene(&args.scene)?;
+    let (bytes, report) = match &args.server {
+        Some(server) => render_there(args, server, &mut scene).await?,
+        None => render_here(args, &mut scene).await?,
+    };
+    std::fs::write(&args.output, bytes).map_err(|e| Error::internal(format!("{}: {e}", args.output.display())))?;
+    let percent = |v: &Value| v.as_f64().map_or("unknown".into(), |e| format!("{:.3} %", 100.0 * e));
+    let (time, stop) = (&report["timings"]["elapsed_ms"], report["stopped_by"].as_str().unwrap_or("?"));
+    println!(
+        "{}: {} samples, error {}, {time:.0} ms, stopped by {stop}",
+        args.output.display(),
+        report["samples"],
+        percent(&report["error"])
+    );
+    Ok(())
+}
+
+async fn render_there(args: &RenderArgs, server: &str, scene: &mut Value) -> Result<(Vec<u8>, Value)> {
+    let client = Client::new(server, args.token.clone())?;
+    if let Some(path) = &args.volume {
+        scene["volume"] = json!({"id": client.upload(path).await?});
+    }
+    let bar = bar(scene);
+    let done = client
+        .render(scene, |p| {
+            bar.set_position(p.samples);
+            bar.set_message(p.error.map_or(String::new(), |e| format!("error {:.3} %", 100.0 * e)));
+        })
+        .await;
+    bar.finish();
+    done
+}
+
+/// The same code as the server's, without the server.
+async fn render_here(args: &RenderArgs, scene: &mut Value) -> Result<(Vec<u8>, Value)> {
+    let store = Store::open(&args.device.data_dir().join("volumes"), args.limits.store())?;
+    if let Some(path) = &args.volume {
+        let bytes = std::fs::read(path).map_err(|e| Error::Malformed(format!("{}: {e}", path.display())))?;
+        let name = path.file_name().map_or_else(|| "volume".into(), |n| n.to_string_lossy().into_owned());
+        scene["volume"] = json!({"id": store.insert(bytes, &name, None)?.1});
+    }
+    let valid = Scene::from_json(scene, &store, &args.limits)?;
+    let engine = Engine::start(args.device.device_config(), args.limits.clone())?;
+    engine.ready().await?;
+    let job = engine.submit(scene.clone(), valid)?;
+    let bar = bar(scene);
+    let mut updates = job.watch();
+    loop {
+        let update = updates.borrow_and_update().clone();
+        if let Some(frame) = &update.frame {
+            bar.set_position(u64::from(frame.samples));
+            bar.set_message(format!("error {:.3} %", 100.0 * frame.error.total));
+        }
+        match (update.state, update.frame) {
+            (State::Done, Some(last)) => {
+                bar.finish();
+                let exr = args.output.extension().is_some_and(|e| e == "exr");
+                let bytes = match job.film() {
+                    Some((film, error)) if exr => frame::exr(&film, &error)?,
+                    _ => last.png.to_vec(),
+                };
+                return Ok((bytes, job.resource()));
+            }
+            (State::Failed | State::Cancelled, _) => {
+                return Err(Error::internal(job.resource()["failure"].to_string()));
+            }
+            _ => updates.changed().await.map_err(Error::internal)?,
+        }
+    }
+}
+
+fn show_devices(args: &DeviceArgs) -> Result<()> {
+    let all: Vec<_> = device::list(args.lanes)?.into_iter().map(|(_, info)| info).collect();
+    let (_, used) = device::select(&args.device, args.lanes)?;
+    let text = serde_json::to_string_pretty(&json!({"devices": all, "would_use": used})).map_err(Error::internal)?;
+    println!("{text}");
+    Ok(())
+}
