@@ -1,0 +1,115 @@
+//! What the tests share: the real binary as a server on a free port, a client, and the real scans.
+
+#![allow(dead_code, reason = "each test file uses its own part of this")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test says what is wrong by panicking")]
+
+use std::io::{BufRead, BufReader};
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// A `cloudchamber serve` with a data folder of its own; stopped when dropped.
+pub struct Server {
+    child: Child,
+    url: String,
+    pub data: tempfile::TempDir,
+}
+
+/// One cache of compiled kernels for all tests: they are the same for each.
+pub fn kernel_cache() -> PathBuf {
+    std::env::var_os("POCL_CACHE_DIR").map_or_else(|| PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("kernels"), PathBuf::from)
+}
+
+impl Server {
+    /// A server with the default settings.
+    pub fn start() -> Self {
+        Self::start_with(&[])
+    }
+
+    /// A server with further flags, once it is ready.
+    pub fn start_with(flags: &[&str]) -> Self {
+        let server = Self::spawn(flags);
+        let started = Instant::now();
+        while !server.is_ready() {
+            assert!(started.elapsed() < Duration::from_secs(180), "the server is not ready after three minutes");
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        server
+    }
+
+    /// A server that may not be ready yet.
+    pub fn spawn(flags: &[&str]) -> Self {
+        let data = tempfile::tempdir().unwrap();
+        std::fs::create_dir_all(kernel_cache()).unwrap();
+        let mut child = Command::new(env!("CARGO_BIN_EXE_cloudchamber"))
+            .args(["serve", "--listen", "127.0.0.1:0", "--data-dir"])
+            .arg(data.path())
+            .args(flags)
+            .env("POCL_CACHE_DIR", kernel_cache())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+        let first = lines.next().unwrap().unwrap();
+        let url = first.split_whitespace().last().unwrap().to_owned();
+        assert!(url.starts_with("http://127.0.0.1:"), "the server said: {first}");
+        // Whatever else it prints must be read, or it would block.
+        std::thread::spawn(move || lines.map_while(Result::ok).for_each(|line| eprintln!("server: {line}")));
+        Self { child, url, data }
+    }
+
+    /// Its address, such as `http://127.0.0.1:40000`.
+    pub fn url(&self) -> String {
+        self.url.clone()
+    }
+
+    /// `host:port`.
+    pub fn address(&self) -> String {
+        self.url.trim_start_matches("http://").to_owned()
+    }
+
+    fn is_ready(&self) -> bool {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+        let url = format!("{}/readyz", self.url);
+        std::thread::spawn(move || runtime.block_on(async { reqwest::get(url).await.is_ok_and(|r| r.status() == 200) })).join().unwrap()
+    }
+
+    pub fn pid(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// Resident memory in bytes.
+    pub fn resident_bytes(&self) -> u64 {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.pid())).unwrap();
+        let line = status.lines().find(|l| l.starts_with("VmRSS:")).unwrap();
+        line.split_whitespace().nth(1).unwrap().parse::<u64>().unwrap() * 1024
+    }
+
+    /// Sends SIGTERM.
+    pub fn terminate(&self) {
+        assert!(Command::new("kill").args(["-TERM", &self.pid().to_string()]).status().unwrap().success());
+    }
+
+    /// Waits for its end and returns the exit code.
+    pub fn wait(&mut self) -> Option<i32> {
+        self.child.wait().unwrap().code()
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        drop(self.child.kill());
+        drop(self.child.wait());
+    }
+}
+
+/// The MRI head of Debian's `mricron-data`.
+pub fn mri_head() -> Vec<u8> {
+    let path = std::env::var("CLOUDCHAMBER_TEST_MRI").unwrap_or_else(|_| "/usr/share/mricron/templates/ch2.nii.gz".into());
+    std::fs::read(&path).unwrap_or_else(|e| panic!("{path}: {e}; install mricron-data or set CLOUDCHAMBER_TEST_MRI"))
+}
+
+/// The CT head for trials, where it is.
+pub fn ct_head() -> Option<Vec<u8>> {
+    std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/CT_AVM.nii.gz")).ok()
+}
