@@ -15,7 +15,7 @@ static inline Optical classify(constant const EmissionAbsorption *params, global
     o.sigma = select((Real)(0.0f), gather_reals(table, entry), finite);
     o.solid = MASK(o.sigma > 0.0f);
     o.colour = real3(0.0f, 0.0f, 0.0f);
-    if (any(o.solid)) {
+    if (any_lane(o.solid)) {
         Int rg = gather_ints((global const int *)(table + TABLE_SIZE), entry);
         Int b = gather_ints((global const int *)(table + 2 * TABLE_SIZE), entry);
         float unit = 1.0f / 65535.0f;
@@ -51,7 +51,7 @@ static inline void composite(constant const View *view, constant const EmissionA
                              global const float *table, Real3 p, Real step, Mask active, Real3 half_vector, Radiance *r) {
     Optical o = classify(params, table, sample_raw(view, voxels, p));
     Mask solid = o.solid & active;
-    if (!any(solid)) return;
+    if (!any_lane(solid)) return;
 #if SHADED
     o.colour = shade(view, params, voxels, p, o.colour, half_vector);
 #endif
@@ -76,7 +76,7 @@ static inline Radiance march(constant const View *view, constant const EmissionA
     r.colour = real3(0.0f, 0.0f, 0.0f);
     r.transmittance = (Real)(1.0f);
 #if BACK_TO_FRONT
-    for (Int k = count - 1; any(MASK(k >= 0)); k -= 1) {
+    for (Int k = count - 1; any_lane(MASK(k >= 0)); k -= 1) {
         Real3 p = along(entry, direction, (to_real(k) + jitter) * step);
         composite(view, params, voxels, table, p, step, MASK(k >= 0), half_vector, &r);
     }
@@ -84,19 +84,19 @@ static inline Radiance march(constant const View *view, constant const EmissionA
     Int k = (Int)(0);
     Int last_x = (Int)((view->dims[0] - 1) >> 3), last_y = (Int)((view->dims[1] - 1) >> 3), last_z = (Int)((view->dims[2] - 1) >> 3);
     Mask alive = MASK(count > 0);
-    while (any(alive)) {
+    while (any_lane(alive)) {
         Real s = (to_real(k) + jitter) * step;
         Real3 p = along(entry, direction, s);
         Int cx = clamp(to_int(p.x) >> 3, (Int)(0), last_x), cy = clamp(to_int(p.y) >> 3, (Int)(0), last_y), cz = clamp(to_int(p.z) >> 3, (Int)(0), last_z);
         Int distance = cell_distance(view, distances, cx, cy, cz);
         Mask empty = MASK(distance > 0) & alive;
-        if (any(empty)) {
+        if (any_lane(empty)) {
             Real leave = fmin(leap_axis(p.x, direction.x, cx, distance), fmin(leap_axis(p.y, direction.y, cy, distance), leap_axis(p.z, direction.z, cz, distance)));
             Int next = to_int(fmin(ceil(mad(leave + s, 1.0f / step, -jitter)), to_real(count)));
             k = select(k, max(next, k + 1), empty);
             alive &= MASK(k < count);
         }
-        if (!any(alive & ~empty)) continue;
+        if (!any_lane(alive & ~empty)) continue;
         // Four samples before the next look at the cells: looking costs about a quarter of a sample.
         for (int i = 0; i < 4; i++) {
             composite(view, params, voxels, table, along(entry, direction, (to_real(k) + jitter) * step), step, alive, half_vector, &r);

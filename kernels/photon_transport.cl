@@ -123,14 +123,14 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
 
     for (;;) {
         Mask fresh = ~alive & MASK(left > 0);
-        if (any(fresh)) {
+        if (any_lane(fresh)) {
             photon.number = as_UInt(select(as_Int(photon.number), share - left, fresh));
             emit(pass, params, lane_first, fresh, &photon);
             left -= select((Int)(0), (Int)(1), fresh);
             steps = select(steps, (Int)(0), fresh);
             alive |= fresh;
         }
-        if (!any(alive)) break;
+        if (!any_lane(alive)) break;
 
         Int cell = (photon.z * ny + photon.y) * nx + photon.x;
         Real sigma = gather_reals(extinction_per_mm, select((Int)(0), cell, alive));
@@ -149,19 +149,19 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
         photon.x += in_x & up_x, photon.y += in_y & up_y, photon.z += in_z & up_z;
         Mask out_x = in_x & (MASK(photon.x < 0) | MASK(photon.x >= nx)), out_y = in_y & (MASK(photon.y < 0) | MASK(photon.y >= ny)), out_z = in_z & (MASK(photon.z < 0) | MASK(photon.z >= nz));
         Mask out = out_x | out_y | out_z;
-        if (any(out)) {
+        if (any_lane(out)) {
             Int face = select(select((Int)(4), (Int)(2), out_y), (Int)(0), out_x);
             Int up = select(select(up_z, up_y, out_y), up_x, out_x);
             tally(ledger, LEDGER_EXIT + face + select((Int)(0), (Int)(1), MASK(up > 0)), photon.weight, out);
         }
         Mask goes_on = hit;
-        if (any(hit)) {
+        if (any_lane(hit)) {
             goes_on = collide(pass, params, lane_first, sigma, cell, hit, grid, ledger, &photon);
             scatterings += as_UInt(select((Int)(0), (Int)(1), hit));
         }
         steps += 1;
         Mask fault = alive & (MASK(steps > MOST_STEPS) | MASK(!(photon.weight <= 1e30f)));
-        if (any(fault)) {
+        if (any_lane(fault)) {
             tally(ledger, (Int)(LEDGER_LOST), select((Real)(0.0f), photon.weight, MASK(photon.weight <= 1e30f)), fault & ~out & (goes_on | crosses));
             tally(ledger, (Int)(LEDGER_FAULTS), (Real)(1.0f), fault);
         }

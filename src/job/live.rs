@@ -78,10 +78,12 @@ impl DeviceContext {
         });
     }
 
-    /// Work-items, of `width` rays or histories each, that take about `slice`. Unknown variants start small.
+    /// Work-items, of `width` rays or histories each, that take about `slice`: whole work-groups, so that the next slice starts
+    /// where this one ends. Unknown variants start small.
     pub fn items_for(&self, variant: &Variant, slice: Duration, width: usize) -> usize {
         let per_ms = self.speed.get(variant).copied().unwrap_or(50.0);
-        ((per_ms * slice.as_secs_f64() * 1e3 / width as f64) as usize).max(self.device.info().local_size)
+        let local = self.device.info().local_size;
+        ((per_ms * slice.as_secs_f64() * 1e3 / width as f64) as usize).div_ceil(local).max(1) * local
     }
 
     /// Learns from a launch. A speed rises at most fourfold at a time, so that one lucky launch makes no long slice.

@@ -76,7 +76,7 @@ impl ViewRun {
             Ok(Layer { buffer: device.allocate(20 * width * height)?, width, height, stride, samples: 0, stream })
         };
         let layers = [layer(PREVIEW, 2)?, layer(CONTROL, 1)?, layer(1, 0)?];
-        let parameters = device.upload(&scene.view().parameters(volume, scene.camera()), 0)?;
+        let parameters = device.upload(&scene.view().parameters(volume, scene.camera())?, 0)?;
         let mut view = scene.camera().device_view(scene.image(), volume);
         view.full_width = size[0] as i32;
         view.seed = [scene.seed() as u32, (scene.seed() >> 32) as u32];
@@ -114,7 +114,7 @@ impl ViewRun {
             seed: keep.seed,
             ..scene.camera().device_view(scene.image(), volume)
         };
-        context.device.write(&mut self.parameters, 0, &scene.view().parameters(volume, scene.camera()))?;
+        context.device.write(&mut self.parameters, 0, &scene.view().parameters(volume, scene.camera())?)?;
         context.device.write(&mut self.counts, 0, &[0; 32])?;
         for layer in &mut self.layers {
             layer.samples = 0;

@@ -24,6 +24,8 @@ pub struct TransferRequest {
     /// `hls`: opacity = pow(v / vmax, exponent).
     #[schemars(range(min = 0.01, max = 20))]
     pub exponent: Option<f64>,
+    /// The values that a preset spans. Default: the volume's range; for a computed field, 0 to what 99.8 % of its voxels stay below.
+    pub value_range: Option<[f64; 2]>,
     /// Control points in rising order of value, linear between them, constant outside. Instead of a preset.
     #[schemars(length(min = 1, max = 256))]
     pub points: Option<Vec<ControlPoint>>,
@@ -109,6 +111,31 @@ fn is_hounsfield(range: [f64; 2]) -> bool {
     range[0] <= -500.0 && range[1] >= 600.0
 }
 
+/// The values that a preset spans. A field's brightest voxels stand next to its source and would leave the rest dark.
+fn span(wish: Option<[f64; 2]>, volume: &Volume, at: &str) -> Result<[f64; 2]> {
+    match wish {
+        Some([low, high]) if high > low => Ok([low, high]),
+        Some([low, _]) => {
+            Err(Error::invalid(format!("{at}/value_range/1"), "the range is empty", format!("more than {low}")))
+        }
+        None if volume.format() == "field" => Ok([0.0, quantile(volume, 0.998)]),
+        None => Ok(volume.range()),
+    }
+}
+
+/// The value that the part `q` of the finite voxels stays below; at least a millionth of the largest, so that it spans something.
+fn quantile(volume: &Volume, q: f64) -> f64 {
+    let mut values: Vec<f32> =
+        (0..volume.voxels().len()).map(|i| volume.voxels().get_f32(i)).filter(|v| v.is_finite()).collect();
+    let least = (volume.range()[1] * 1e-6).max(f64::MIN_POSITIVE);
+    if values.is_empty() {
+        return least;
+    }
+    let at = ((values.len() - 1) as f64 * q) as usize;
+    let (_, value, _) = values.select_nth_unstable_by(at, f32::total_cmp);
+    (f64::from(*value) * volume.slope() + volume.inter()).max(least)
+}
+
 impl TransferFunction {
     /// The valid function of a request for `volume`. `at` is its JSON pointer. Also the name of what was taken.
     ///
@@ -128,17 +155,18 @@ impl TransferFunction {
         };
         let preset = request.preset.as_deref().unwrap_or(suits);
         let full = PRESET_OPTICAL_DEPTH / super::mean_side(volume);
+        let range = span(request.value_range, volume, at)?;
         let function = match preset {
             "hls" => Self::Hls {
                 rotation: request.rotation.unwrap_or(0.0),
                 exponent: request.exponent.unwrap_or(2.0),
-                value_max: volume.range()[1],
+                value_max: range[1],
                 opacity_per_unit: full,
             },
-            "ct_bone" if is_hounsfield(volume.range()) => Self::from_preset(CT_BONE_HOUNSFIELD, [0.0, 1.0], full),
-            "ct_bone" => Self::from_preset(CT_BONE, volume.range(), full),
-            "mri_head" => Self::from_preset(MRI_HEAD, volume.range(), full),
-            _ => Self::from_preset(RAMP, volume.range(), full),
+            "ct_bone" if is_hounsfield(range) => Self::from_preset(CT_BONE_HOUNSFIELD, [0.0, 1.0], full),
+            "ct_bone" => Self::from_preset(CT_BONE, range, full),
+            "mri_head" => Self::from_preset(MRI_HEAD, range, full),
+            _ => Self::from_preset(RAMP, range, full),
         };
         Ok((function, format!("the preset {preset}")))
     }
@@ -159,6 +187,15 @@ impl TransferFunction {
         Self::Points(points.iter().map(|&(f, rgb, opacity)| by_eye(place(f), rgb, opacity * full)).collect())
     }
 
+    /// The values between which the function changes: what a table of it has to cover.
+    pub fn domain(&self) -> [f64; 2] {
+        let [low, high] = match self {
+            Self::Points(points) => [points.first(), points.last()].map(|p| p.map_or(0.0, |p| p.value)),
+            Self::Hls { value_max, .. } => [0.0, *value_max],
+        };
+        if high > low { [low, high] } else { [low, low + 1.0] }
+    }
+
     /// Linear colour and opacity per unit at a value.
     pub fn evaluate(&self, value: f64) -> ([f64; 3], f64) {
         match self {
@@ -170,8 +207,9 @@ impl TransferFunction {
         }
     }
 
-    /// The device's table over `[low, high]`: `TABLE_SIZE` opacities, then red and green, then blue, as pairs of 16 bits.
-    pub fn table(&self, [low, high]: [f64; 2], opacity_scale: f64) -> Vec<f32> {
+    /// The device's table over [`TransferFunction::domain`]: `TABLE_SIZE` opacities, then red and green, then blue, as pairs of 16 bits.
+    pub fn table(&self, opacity_scale: f64) -> Vec<f32> {
+        let [low, high] = self.domain();
         let mut table = vec![0.0f32; 3 * TABLE_SIZE];
         let bits = |c: f64| (c.clamp(0.0, 1.0) * 65535.0).round() as u32;
         for i in 0..TABLE_SIZE {

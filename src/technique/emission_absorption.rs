@@ -215,15 +215,8 @@ fn parse(parameters: &Value, at: &str) -> Result<Arc<dyn View>> {
     Ok(Arc::new(parameters))
 }
 
-/// The range of values that the table covers: the volume's own.
-fn domain(volume: &Volume) -> [f64; 2] {
-    let [low, high] = volume.range();
-    if high > low { [low, high] } else { [low, low + 1.0] }
-}
-
 /// Which macro-cells hold a value with any opacity, by a running count over the table.
-fn distances(volume: &Volume, table: &[f32]) -> Vec<u8> {
-    let [low, high] = domain(volume);
+fn distances(volume: &Volume, table: &[f32], [low, high]: [f64; 2]) -> Vec<u8> {
     let mut solid_before = vec![0u32; TABLE_SIZE + 1];
     for i in 0..TABLE_SIZE {
         solid_before[i + 1] = solid_before[i] + u32::from(table[i] > 0.0);
@@ -239,13 +232,18 @@ fn distances(volume: &Volume, table: &[f32]) -> Vec<u8> {
     volume.cells().empty_distance(&occupied)
 }
 
+impl Parameters {
+    fn transfer_function(&self, volume: &Volume) -> Result<(TransferFunction, String)> {
+        let request = self.transfer_function.clone().unwrap_or_default();
+        TransferFunction::from_request(&request, volume, "/emission_absorption/transfer_function")
+    }
+}
+
 impl View for Parameters {
     fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
-        let request = self.transfer_function.clone().unwrap_or_default();
-        let at = "/emission_absorption/transfer_function";
-        let (function, named) = TransferFunction::from_request(&request, volume, at)?;
-        let table = function.table(domain(volume), self.opacity_scale);
-        let mut distances = distances(volume, &table);
+        let (function, named) = self.transfer_function(volume)?;
+        let table = function.table(self.opacity_scale);
+        let mut distances = distances(volume, &table, function.domain());
         let empty = distances.iter().filter(|d| **d > 0).count();
         let mut reasons = vec![
             format!("transfer function: {named}"),
@@ -267,10 +265,10 @@ impl View for Parameters {
         })
     }
 
-    fn parameters(&self, volume: &Volume, camera: &Camera) -> Vec<u8> {
+    fn parameters(&self, volume: &Volume, camera: &Camera) -> Result<Vec<u8>> {
         let light = self.light.clone().unwrap_or_default();
         let towards_light = light.direction.map_or(camera.towards_eye(), |d| DVec3::from(d).normalize());
-        let [low, high] = domain(volume);
+        let [low, high] = self.transfer_function(volume)?.0.domain();
         let per_value = (TABLE_SIZE - 1) as f64 / (high - low);
         // A gradient is a covector: it goes to the world by the transpose of index-from-world. The sign of the slope does not
         // matter, since the light is two-sided.
@@ -292,6 +290,6 @@ impl View for Parameters {
             light: towards_light.as_vec3().to_array(),
             world_gradient_from_index: row_major.map(|v| v as f32),
         };
-        bytemuck::bytes_of(&device).to_vec()
+        Ok(bytemuck::bytes_of(&device).to_vec())
     }
 }

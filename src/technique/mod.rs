@@ -75,7 +75,10 @@ pub trait View: Send + Sync {
     /// `Error::Invalid` where parameters and volume do not go together.
     fn plan(&self, volume: &Volume) -> Result<ViewPlan>;
     /// The kernel's own parameters for a camera, as the bytes of its device struct.
-    fn parameters(&self, volume: &Volume, camera: &Camera) -> Vec<u8>;
+    ///
+    /// # Errors
+    /// As [`View::plan`].
+    fn parameters(&self, volume: &Volume, camera: &Camera) -> Result<Vec<u8>>;
 }
 
 /// What a field's kernel is run with: data, no device needed to make it.

@@ -3,6 +3,8 @@
 #![allow(dead_code, reason = "each test file uses its own part of this")]
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test says what is wrong by panicking")]
 
+pub mod engine;
+
 use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
@@ -17,7 +19,8 @@ pub struct Server {
 
 /// One cache of compiled kernels for all tests: they are the same for each.
 pub fn kernel_cache() -> PathBuf {
-    std::env::var_os("POCL_CACHE_DIR").map_or_else(|| PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("kernels"), PathBuf::from)
+    std::env::var_os("POCL_CACHE_DIR")
+        .map_or_else(|| PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("kernels"), PathBuf::from)
 }
 
 impl Server {
@@ -28,17 +31,29 @@ impl Server {
 
     /// A server with further flags, once it is ready.
     pub fn start_with(flags: &[&str]) -> Self {
-        let server = Self::spawn(flags);
+        Self::start_env(flags, &[])
+    }
+
+    fn once_ready(self) -> Self {
         let started = Instant::now();
-        while !server.is_ready() {
+        while !self.is_ready() {
             assert!(started.elapsed() < Duration::from_secs(180), "the server is not ready after three minutes");
             std::thread::sleep(Duration::from_millis(50));
         }
-        server
+        self
+    }
+
+    /// A server with further flags and environment variables, once it is ready.
+    pub fn start_env(flags: &[&str], environment: &[(&str, &str)]) -> Self {
+        Self::spawn_env(flags, environment).once_ready()
     }
 
     /// A server that may not be ready yet.
     pub fn spawn(flags: &[&str]) -> Self {
+        Self::spawn_env(flags, &[])
+    }
+
+    fn spawn_env(flags: &[&str], environment: &[(&str, &str)]) -> Self {
         let data = tempfile::tempdir().unwrap();
         std::fs::create_dir_all(kernel_cache()).unwrap();
         let mut child = Command::new(env!("CARGO_BIN_EXE_cloudchamber"))
@@ -46,6 +61,7 @@ impl Server {
             .arg(data.path())
             .args(flags)
             .env("POCL_CACHE_DIR", kernel_cache())
+            .envs(environment.iter().copied())
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
@@ -71,7 +87,9 @@ impl Server {
     fn is_ready(&self) -> bool {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
         let url = format!("{}/readyz", self.url);
-        std::thread::spawn(move || runtime.block_on(async { reqwest::get(url).await.is_ok_and(|r| r.status() == 200) })).join().unwrap()
+        std::thread::spawn(move || runtime.block_on(async { reqwest::get(url).await.is_ok_and(|r| r.status() == 200) }))
+            .join()
+            .unwrap()
     }
 
     pub fn pid(&self) -> u32 {
@@ -105,7 +123,8 @@ impl Drop for Server {
 
 /// The MRI head of Debian's `mricron-data`.
 pub fn mri_head() -> Vec<u8> {
-    let path = std::env::var("CLOUDCHAMBER_TEST_MRI").unwrap_or_else(|_| "/usr/share/mricron/templates/ch2.nii.gz".into());
+    let path =
+        std::env::var("CLOUDCHAMBER_TEST_MRI").unwrap_or_else(|_| "/usr/share/mricron/templates/ch2.nii.gz".into());
     std::fs::read(&path).unwrap_or_else(|e| panic!("{path}: {e}; install mricron-data or set CLOUDCHAMBER_TEST_MRI"))
 }
 

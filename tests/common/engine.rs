@@ -1,0 +1,92 @@
+//! The engine in this process, for tests that look at the film itself in linear floats.
+
+use std::sync::{Arc, Mutex, OnceLock};
+
+use clap::Parser;
+use cloudchamber::config::Limits;
+use cloudchamber::device::{self, DeviceConfig};
+use cloudchamber::film::{ErrorEstimate, Film};
+use cloudchamber::job::{Engine, Job, State};
+use cloudchamber::scene::Scene;
+use cloudchamber::volume::Store;
+use serde_json::{Value, json};
+
+#[derive(Parser)]
+struct Flags {
+    #[command(flatten)]
+    limits: Limits,
+}
+
+/// An engine with a store of its own.
+pub struct House {
+    pub engine: Engine,
+    pub store: Store,
+    pub limits: Limits,
+    runtime: tokio::runtime::Runtime,
+    _data: tempfile::TempDir,
+}
+
+impl House {
+    /// A house on PoCL with so many lanes, or with what the device likes.
+    pub fn new(lanes: Option<u32>) -> Self {
+        static ONCE: Mutex<()> = Mutex::new(());
+        let _one_at_a_time = ONCE.lock().unwrap();
+        device::keep_compiled_kernels_in(&super::kernel_cache()).unwrap();
+        let data = tempfile::tempdir().unwrap();
+        let limits = Flags::parse_from(["test"]).limits;
+        let store = Store::open(&data.path().join("volumes"), limits.store()).unwrap();
+        let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().unwrap();
+        let config = DeviceConfig { wish: "pocl".into(), lanes, kernels: None };
+        let engine = runtime.block_on(async { Engine::start(config, limits.clone()) }).unwrap();
+        runtime.block_on(engine.ready()).unwrap();
+        Self { engine, store, limits, runtime, _data: data }
+    }
+
+    /// The shared one, with the device's own lanes.
+    pub fn shared() -> &'static Self {
+        static HOUSE: OnceLock<House> = OnceLock::new();
+        HOUSE.get_or_init(|| Self::new(None))
+    }
+
+    /// Runs a request to its end.
+    pub fn finish(&self, request: &Value) -> Arc<Job> {
+        let scene = Scene::from_json(request, &self.store, &self.limits).unwrap_or_else(|e| panic!("{request}: {e}"));
+        let job = self.engine.submit(request.clone(), scene).unwrap();
+        let mut updates = job.watch();
+        self.runtime.block_on(updates.wait_for(|u| u.state.is_terminal())).unwrap();
+        assert_eq!(job.state(), State::Done, "{}", job.resource());
+        job
+    }
+
+    /// The film of a finished request.
+    pub fn film(&self, request: &Value) -> (Arc<Film>, ErrorEstimate) {
+        self.finish(request).film().unwrap()
+    }
+
+    /// Puts a raw volume of floats in the store and returns what goes under `volume`.
+    pub fn floats(&self, dims: [usize; 3], value: impl Fn(f64, f64, f64) -> f64) -> Value {
+        let mut bytes = Vec::new();
+        let centre = |i: usize, n: usize| (i as f64 + 0.5) / n as f64 * 2.0 - 1.0;
+        for z in 0..dims[2] {
+            for y in 0..dims[1] {
+                for x in 0..dims[0] {
+                    let v = value(centre(x, dims[0]), centre(y, dims[1]), centre(z, dims[2])) as f32;
+                    bytes.extend_from_slice(&v.to_le_bytes());
+                }
+            }
+        }
+        let query = cloudchamber::volume::RawQuery {
+            dims: Some(dims.map(|n| n.to_string()).join(",")),
+            r#type: Some("f32".into()),
+            spacing: Some(dims.map(|n| (2.0 / n as f64).to_string()).join(",")),
+            endian: None,
+        };
+        let (_, id, _) = self.store.insert(bytes, "test", query.parse().unwrap()).unwrap();
+        json!({"id": id})
+    }
+
+    /// Puts a volume file in the store and returns what goes under `volume`.
+    pub fn file(&self, bytes: Vec<u8>) -> Value {
+        json!({"id": self.store.insert(bytes, "file", None).unwrap().1})
+    }
+}

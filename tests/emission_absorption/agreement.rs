@@ -1,0 +1,105 @@
+//! Forms that must agree: orders, lanes, with and without skipping, and the same request twice.
+
+use std::sync::Arc;
+
+use cloudchamber::film::Film;
+use serde_json::{Value, json};
+
+use super::common::engine::House;
+use super::common::{ct_head, mri_head};
+
+fn request(volume: &Value, samples: u32, parameters: Value) -> Value {
+    json!({
+        "technique": "emission_absorption", "volume": volume, "image": {"width": 160, "height": 120},
+        "budget": {"samples": samples}, "seed": 5, "emission_absorption": parameters
+    })
+}
+
+fn worst(a: &Arc<Film>, b: &Arc<Film>) -> f32 {
+    assert_eq!(a.main.mean.len(), b.main.mean.len());
+    a.main.mean.iter().zip(&b.main.mean).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+}
+
+#[test]
+fn back_to_front_is_front_to_back() {
+    let house = House::shared();
+    let volume = house.file(mri_head());
+    for shading in [false, true] {
+        let film = |order: &str| {
+            house.film(&request(&volume, 2, json!({"order": order, "opacity_threshold": 1, "shading": shading}))).0
+        };
+        let difference = worst(&film("front_to_back"), &film("back_to_front"));
+        assert!(difference < 1e-5, "shading {shading}: {difference:e}");
+    }
+}
+
+#[test]
+fn skipping_changes_nothing() {
+    let house = House::shared();
+    let mut volumes = vec![house.file(mri_head()), json!({"builtin": "smoke", "resolution": 64})];
+    volumes.extend(ct_head().map(|bytes| house.file(bytes)));
+    for volume in volumes {
+        for preset in ["ramp", "mri_head", "ct_bone"] {
+            let film = |skip: bool| {
+                let parameters = json!({"empty_space_skipping": skip, "transfer_function": {"preset": preset}});
+                house.film(&request(&volume, 1, parameters)).0
+            };
+            let difference = worst(&film(true), &film(false));
+            assert!(difference < 1e-5, "{volume} with {preset}: {difference:e}");
+        }
+    }
+}
+
+#[test]
+fn every_number_of_lanes_gives_the_same_picture() {
+    let reference = House::shared();
+    for lanes in [1, 4, 8] {
+        let house = House::new(Some(lanes));
+        for parameters in [json!({}), json!({"shading": true}), json!({"order": "back_to_front"})] {
+            let film = |house: &House| house.film(&request(&house.file(mri_head()), 2, parameters.clone())).0;
+            let (narrow, wide) = (film(&house), film(reference));
+            let difference = worst(&narrow, &wide);
+            assert!(difference < 1.0 / 255.0, "{lanes} lanes, {parameters}: {difference:e}");
+            let apart = narrow.main.mean.iter().zip(&wide.main.mean).filter(|(a, b)| (*a - *b).abs() > 1e-5).count();
+            assert!(
+                apart * 1000 < narrow.main.mean.len(),
+                "{lanes} lanes, {parameters}: {apart} values differ by more than 1e-5"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_same_request_gives_the_same_bytes() {
+    let house = House::shared();
+    let volume = house.file(mri_head());
+    let png = || {
+        house
+            .finish(&request(&volume, 5, json!({"shading": true})))
+            .watch()
+            .borrow()
+            .frame
+            .as_ref()
+            .unwrap()
+            .png
+            .clone()
+    };
+    assert_eq!(png(), png());
+}
+
+#[test]
+fn a_seed_changes_the_noise_and_not_the_picture() {
+    let house = House::shared();
+    let volume = house.file(mri_head());
+    let film = |seed: u64| {
+        let mut request = request(&volume, 16, json!({}));
+        request["seed"] = json!(seed);
+        house.film(&request)
+    };
+    let ((a, error), (b, _)) = (film(1), film(2));
+    assert!(worst(&a, &b) > 1e-4, "another seed must give other noise");
+    // Two independent means differ by the square root of two standard errors.
+    let difference = a.difference(&b).unwrap() / 2.0f64.sqrt();
+    let noise = error.noise.unwrap();
+    assert!(difference < 1.5 * noise, "the pictures differ by {difference}, the noise is said to be {noise}");
+}

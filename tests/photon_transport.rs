@@ -1,0 +1,10 @@
+//! `photon_transport` against closed forms and an independent simulation in double precision.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test says what is wrong by panicking")]
+
+mod common;
+
+#[path = "photon_transport/oracle.rs"]
+mod oracle;
+#[path = "photon_transport/truth.rs"]
+mod truth;
