@@ -40,6 +40,8 @@ fn draw(svg: &mut String, trace: &[TracePoint], state: &str) -> std::result::Res
         .configure_mesh()
         .x_desc("elapsed / ms")
         .y_desc("relative error (RMS)")
+        .x_labels(4)
+        .y_labels(5)
         .x_label_formatter(&|v| plain(*v))
         .y_label_formatter(&|v| plain(*v))
         .draw()?;

@@ -2,6 +2,9 @@
 
 use serde::Serialize;
 
+use crate::error::Result;
+use crate::frame;
+
 /// Means and squared deviations of one set of samples, as the device leaves them (`kernels/shared/film.h`).
 #[derive(Debug, Clone, Default)]
 pub struct Samples {
@@ -165,6 +168,30 @@ impl Film {
         let rms = (squared / self.main.pixels().max(1) as f64).sqrt();
         let mean = self.main.mean_luminance();
         Some(if mean > 0.0 { rms / mean } else { rms })
+    }
+
+    /// What a picture of this film says of itself. No times: the same request and number of samples gives the same bytes.
+    pub fn description(&self, error: &ErrorEstimate) -> String {
+        let stride = self.main.stride;
+        serde_json::json!({"samples": self.main.count, "error": error.total, "error_parts": error, "stride": stride})
+            .to_string()
+    }
+
+    /// The film as PNG bytes, and how many values were clipped at white.
+    ///
+    /// # Errors
+    /// `Error::Internal` when the encoder fails.
+    pub fn png(&self, error: &ErrorEstimate) -> Result<(Vec<u8>, u64)> {
+        let (rgb, clipped) = self.srgb8();
+        Ok((frame::png(self.size, &rgb, self.description(error))?, clipped))
+    }
+
+    /// The film as OpenEXR bytes.
+    ///
+    /// # Errors
+    /// `Error::Internal` when the encoder fails.
+    pub fn exr(&self, error: &ErrorEstimate) -> Result<Vec<u8>> {
+        frame::exr(self.size, &self.linear_rgb(), &self.description(error))
     }
 
     /// Bytes held.

@@ -1,74 +1,41 @@
-//! A picture with its metadata as PNG or OpenEXR bytes.
+//! A picture with its description as PNG or OpenEXR bytes.
 
 use std::borrow::Cow;
 
 use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage};
-use serde_json::json;
 
 use crate::error::{Error, Result};
-use crate::film::{ErrorEstimate, Film};
 
-/// One encoded frame and what it says of itself.
-#[derive(Debug, Clone)]
-pub struct Frame {
-    /// Counts the render's frames from 1; also the id of its event.
-    pub sequence: u64,
-    /// PNG bytes.
-    pub png: bytes::Bytes,
-    /// Samples per pixel.
-    pub samples: u32,
-    /// The error and its parts.
-    pub error: ErrorEstimate,
-    /// Milliseconds since the render (or its newest camera) was asked for.
-    pub elapsed_ms: f64,
-    /// Milliseconds of device time so far.
-    pub device_ms: f64,
-    /// Whether no better frame will follow.
-    pub is_final: bool,
-    /// Strong entity tag: the hash of the bytes, which hold nothing that depends on load or time.
-    pub etag: String,
-}
-
-/// What a PNG says of itself in its text chunk, under the keyword `Cloudchamber`. No times: the same request and sample
-/// count gives the same bytes.
-fn description(film: &Film, error: &ErrorEstimate) -> String {
-    json!({"samples": film.main.count, "error": error.total, "error_parts": error, "stride": film.main.stride})
-        .to_string()
-}
-
-/// The picture as PNG, by the encoder's fast path: a frame is looked at once. Also how many values were clipped at white.
+/// 8-bit sRGB as PNG, by the encoder's fast path: a frame is looked at once. `description` goes into its text chunk, under the
+/// keyword `Cloudchamber`.
 ///
 /// # Errors
 /// [`Error::Internal`] when the encoder fails.
-pub fn png(film: &Film, error: &ErrorEstimate) -> Result<(Vec<u8>, u64)> {
-    let [width, height] = film.size;
-    let (rgb, clipped) = film.srgb8();
+pub fn png([width, height]: [usize; 2], rgb: &[u8], description: String) -> Result<Vec<u8>> {
     let mut bytes = Vec::with_capacity(rgb.len() / 2);
     let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_compression(png::Compression::Fastest);
+    encoder.set_compression(png::Compression::Fast);
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
-    encoder.add_text_chunk("Cloudchamber".into(), description(film, error)).map_err(Error::internal)?;
+    encoder.add_text_chunk("Cloudchamber".into(), description).map_err(Error::internal)?;
     let mut writer = encoder.write_header().map_err(Error::internal)?;
-    writer.write_image_data(&rgb).map_err(Error::internal)?;
+    writer.write_image_data(rgb).map_err(Error::internal)?;
     writer.finish().map_err(Error::internal)?;
-    Ok((bytes, clipped))
+    Ok(bytes)
 }
 
-/// The picture in linear 32-bit floats as OpenEXR.
+/// Linear RGB in 32-bit floats as OpenEXR; `description` goes into its comments.
 ///
 /// # Errors
 /// [`Error::Internal`] when the encoder fails.
-pub fn exr(film: &Film, error: &ErrorEstimate) -> Result<Vec<u8>> {
-    let [width, height] = film.size;
-    let rgb = film.linear_rgb();
+pub fn exr([width, height]: [usize; 2], rgb: &[f32], description: &str) -> Result<Vec<u8>> {
     let channel = |name: &str, c: usize| {
         AnyChannel::new(name, FlatSamples::F32(rgb.iter().skip(c).step_by(3).copied().collect()))
     };
     let channels = AnyChannels::sort([channel("R", 0), channel("G", 1), channel("B", 2)].into_iter().collect());
     let mut attributes = LayerAttributes::named("cloudchamber");
-    attributes.comments = exr::prelude::Text::new_or_none(description(film, error));
+    attributes.comments = exr::prelude::Text::new_or_none(description);
     let layer = Layer::new((width, height), attributes, Encoding::FAST_LOSSLESS, channels);
     let mut bytes = std::io::Cursor::new(Vec::new());
     Image::from_layer(layer).write().to_buffered(&mut bytes).map_err(Error::internal)?;

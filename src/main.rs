@@ -7,12 +7,12 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use cloudchamber::client::{self, Client};
 use cloudchamber::config::{Config, DeviceArgs, Limits};
+use cloudchamber::device;
 use cloudchamber::error::{Error, Result};
 use cloudchamber::http::Server;
 use cloudchamber::job::{Engine, State};
 use cloudchamber::scene::Scene;
 use cloudchamber::volume::Store;
-use cloudchamber::{device, frame};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 
@@ -102,6 +102,9 @@ fn run(command: Command) -> Result<()> {
 }
 
 async fn serve(config: &Config) -> Result<()> {
+    // Before the device: the LLVM inside PoCL handles SIGTERM too. Handlers that it finds it passes the signal on to; one that
+    // comes after it calls LLVM's first, which ends the process.
+    let stop = stop_signal()?;
     let server = Server::bind(config).await?;
     println!("Cloudchamber listens on http://{}", server.address()?);
     let engine = server.engine().clone();
@@ -111,17 +114,17 @@ async fn serve(config: &Config) -> Result<()> {
             Err(error) => eprintln!("cloudchamber: {error}"),
         }
     });
-    server.run(stop_signal()).await
+    server.run(stop).await
 }
 
-/// SIGTERM or Ctrl-C.
-async fn stop_signal() {
+/// SIGTERM or Ctrl-C. The handlers are in place when this returns.
+fn stop_signal() -> Result<impl Future<Output = ()> + Send + 'static> {
     use tokio::signal::unix::{SignalKind, signal};
-    let interrupt = tokio::signal::ctrl_c();
-    match signal(SignalKind::terminate()) {
-        Ok(mut terminate) => tokio::select! { _ = interrupt => {}, _ = terminate.recv() => {} },
-        Err(_) => drop(interrupt.await),
-    }
+    let mut interrupt = signal(SignalKind::interrupt()).map_err(Error::internal)?;
+    let mut terminate = signal(SignalKind::terminate()).map_err(Error::internal)?;
+    Ok(async move {
+        tokio::select! { _ = interrupt.recv() => {}, _ = terminate.recv() => {} }
+    })
 }
 
 fn read_scene(path: &Path) -> Result<Value> {
@@ -196,7 +199,7 @@ async fn render_here(args: &RenderArgs, scene: &mut Value) -> Result<(Vec<u8>, V
                 bar.finish();
                 let exr = args.output.extension().is_some_and(|e| e == "exr");
                 let bytes = match job.film() {
-                    Some((film, error)) if exr => frame::exr(&film, &error)?,
+                    Some((film, error)) if exr => film.exr(&error)?,
                     _ => last.png.to_vec(),
                 };
                 return Ok((bytes, job.resource()));

@@ -129,7 +129,7 @@ pub fn parse<T: DeserializeOwned>(value: &Value, schema: &Value, at: &str) -> Re
 pub fn check(value: &Value, schema: &Value, at: &str) -> Result<()> {
     let validator = jsonschema::validator_for(schema).map_err(Error::internal)?;
     let violations: Vec<Violation> =
-        validator.iter_errors(value).take(20).flat_map(|e| violation(&e, schema, at)).collect();
+        validator.iter_errors(value).flat_map(|e| violation(&e, schema, at)).take(20).collect();
     if violations.is_empty() { Ok(()) } else { Err(Error::Invalid(violations)) }
 }
 

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use super::App;
 use crate::error::{Error, Result};
 use crate::job::Readiness;
-use crate::technique;
+use crate::{scene, technique};
 
 /// The process's metrics: one recorder, however many servers are in it.
 ///
@@ -27,8 +27,8 @@ pub(super) fn recorder() -> Result<PrometheusHandle> {
 }
 
 /// `GET /v1/techniques`.
-pub(super) async fn techniques() -> Json<Value> {
-    let one = |t: &technique::Technique| json!({"name": t.name, "kind": t.kind_name(), "summary": t.summary, "schema": (t.schema)(), "example": (t.example)()});
+pub(super) async fn techniques(State(app): State<App>) -> Json<Value> {
+    let one = |t: &technique::Technique| json!({"name": t.name, "kind": t.kind_name(), "summary": t.summary, "schema": scene::parameters_schema(t, &app.limits), "example": (t.example)()});
     Json(json!({"techniques": technique::ALL.iter().map(one).collect::<Vec<_>>()}))
 }
 

@@ -25,7 +25,7 @@ impl IntoResponse for Error {
         };
         let errors = if let Error::Invalid(violations) = &self { json!(violations) } else { json!([]) };
         let slug = title.to_lowercase().replace(' ', "-");
-        let kind = format!("/docs#{slug}").parse::<axum::http::Uri>().unwrap_or_default();
+        let kind = format!("/problems/{slug}").parse::<axum::http::Uri>().unwrap_or_default();
         let mut response = ProblemDetails::from_status_code(status)
             .with_type(kind)
             .with_title(title)

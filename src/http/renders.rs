@@ -14,8 +14,8 @@ use serde_json::{Value, json};
 use super::accept::negotiate;
 use super::{App, problem, streams};
 use crate::error::{Error, Result};
-use crate::frame::{self, Frame};
-use crate::job::{Job, State as JobState};
+use crate::frame;
+use crate::job::{Frame, Job, State as JobState};
 use crate::scene::Scene;
 use crate::{chart, volume};
 
@@ -105,8 +105,8 @@ impl Drop for CancelOnDrop {
 }
 
 async fn finished(app: &App, job: Arc<Job>, fresh: bool, format: &str) -> Result<Response> {
-    let _permit = app.stream_permit()?;
     let mut guard = CancelOnDrop::new(app, &job, fresh);
+    let _permit = app.stream_permit()?;
     let frame = wait_for(app, &job, true).await?;
     guard.armed = false;
     if format == "image/png" { Ok(png_response(&frame)) } else { exr_response(job, &frame).await }
@@ -159,7 +159,7 @@ fn png_response(frame: &Frame) -> Response {
 
 async fn exr_response(job: Arc<Job>, frame: &Frame) -> Result<Response> {
     let (film, error) = job.film().ok_or_else(|| Error::NotFound { what: "frame of render", id: job.id().into() })?;
-    let bytes = tokio::task::spawn_blocking(move || frame::exr(&film, &error)).await.map_err(Error::internal)??;
+    let bytes = tokio::task::spawn_blocking(move || film.exr(&error)).await.map_err(Error::internal)??;
     let etag = frame::etag(&bytes);
     Ok(with_frame_headers(([(header::CONTENT_TYPE, "image/x-exr")], bytes).into_response(), frame, &etag))
 }

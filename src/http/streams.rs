@@ -18,8 +18,7 @@ use tokio_util::sync::CancellationToken;
 use super::App;
 use super::renders::{CancelOnDrop, find, frame_headers};
 use crate::error::Result;
-use crate::frame::Frame;
-use crate::job::{Job, State as JobState, Update};
+use crate::job::{Frame, Job, State as JobState, Update};
 
 /// A reader of a job's updates that knows what it has shown.
 struct Reader {

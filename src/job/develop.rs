@@ -5,7 +5,6 @@ use std::sync::{Arc, Weak};
 
 use super::{Engine, Job, Snapshot, State};
 use crate::error::Error;
-use crate::frame;
 
 /// Runs as long as the job is kept. Snapshots that a newer one overtook are never developed. The one place that tells the
 /// engine that a job has ended.
@@ -35,7 +34,7 @@ pub(super) async fn frames(job: Weak<Job>, engine: Engine) {
             let snapshot = snapshot.clone();
             move || {
                 let error = snapshot.film.error();
-                frame::png(&snapshot.film, &error).map(|(png, clipped)| (png, error, clipped))
+                snapshot.film.png(&error).map(|(png, clipped)| (png, error, clipped))
             }
         })
         .await;

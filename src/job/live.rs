@@ -107,6 +107,15 @@ pub(super) enum Turn {
     Over,
 }
 
+/// What to do after a pass.
+enum Verdict {
+    GoOn,
+    /// Start over with half the step.
+    Refine,
+    /// Stop, and why.
+    Stop(&'static str),
+}
+
 /// A job with its buffers.
 pub(super) struct Live {
     job: Arc<Job>,
@@ -167,7 +176,8 @@ impl Live {
         let first = self.scene.is_none();
         {
             let progress = self.job.lock();
-            if !first && progress.generation == self.generation {
+            // A camera is followed once the one before has been seen: cameras may come faster than frames, and none would be.
+            if !first && (progress.generation == self.generation || self.last_frame.is_none()) {
                 return Ok(());
             }
             (self.generation, self.asked) = (progress.generation, progress.asked);
@@ -230,12 +240,22 @@ impl Live {
         if pass == Pass::Main && self.view.as_ref().is_some_and(|v| v.samples() == 1) && self.field.is_some() {
             self.compare_with_half(context)?;
         }
-        match self.stopped_by(context, pass)? {
-            Some(reason) => {
+        match self.verdict(context, pass)? {
+            Verdict::Refine => {
+                if let Some(view) = &mut self.view {
+                    view.halve_step();
+                }
+                Ok(Turn::Again)
+            }
+            Verdict::Stop(reason) => {
+                if reason == "floor" {
+                    let message = "max_error is below what this technique reaches here, however many samples; the error parts say why";
+                    self.job.lock().warnings.push(json!({"code": "error_floor", "message": message}));
+                }
                 self.snapshot(context, Some(reason))?;
                 Ok(if self.job.leave(self.generation) { Turn::Over } else { Turn::Again })
             }
-            None => {
+            Verdict::GoOn => {
                 let due = self.last_frame.is_none_or(|t| t.elapsed() >= FRAME_EVERY);
                 let proper = pass == Pass::Main || self.view.as_ref().is_some_and(|v| v.samples() == 0);
                 if due && proper && !self.job.developing.swap(true, Ordering::AcqRel) {
@@ -265,31 +285,40 @@ impl Live {
         Ok(())
     }
 
-    /// What stops the render now, if anything. The error is looked at after 2, 3, 4, 6, 8, 12, … samples, a fixed order, so
-    /// that the same request stops at the same sample.
-    fn stopped_by(&self, context: &DeviceContext, pass: Pass) -> Result<Option<&'static str>> {
-        let (Some(view), Some(scene)) = (&self.view, &self.scene) else { return Ok(None) };
+    /// What to do after a pass. The error is looked at after 2, 3, 4, 6, 8, 12, … samples, a fixed order, so that the same
+    /// request stops at the same sample. Where the step, not the noise, keeps the error above what was asked for, the step is
+    /// halved; where nothing is left to halve, the render stops and says so.
+    fn verdict(&self, context: &DeviceContext, pass: Pass) -> Result<Verdict> {
+        let (Some(view), Some(scene)) = (&self.view, &self.scene) else { return Ok(Verdict::GoOn) };
         let (samples, budget) = (view.samples(), scene.budget());
         if pass != Pass::Main {
-            return Ok(None);
+            return Ok(Verdict::GoOn);
         }
         if samples >= budget.samples {
-            return Ok(Some("samples"));
+            return Ok(Verdict::Stop("samples"));
         }
         if budget.time_ms.is_some_and(|ms| self.started.elapsed().as_millis() >= u128::from(ms)) {
-            return Ok(Some("time"));
+            return Ok(Verdict::Stop("time"));
         }
         let round = samples.is_power_of_two() || (samples % 3 == 0 && (samples / 3).is_power_of_two());
-        if let Some(most) = budget.max_error
-            && samples >= 2
-            && round
-        {
-            let film = Film { field_error: self.field_error, ..view.film(context)? };
-            if film.error().total <= most {
-                return Ok(Some("error"));
-            }
+        let Some(most) = budget.max_error.filter(|_| samples >= 2 && round) else { return Ok(Verdict::GoOn) };
+        let error = Film { field_error: self.field_error, ..view.film(context)? }.error();
+        let noise = error.noise.unwrap_or(0.0);
+        let bias = (error.total.powi(2) - noise.powi(2)).max(0.0).sqrt();
+        if error.total <= most {
+            Ok(Verdict::Stop("error"))
+        } else if bias > 0.7 * most && samples >= 4 && noise < bias {
+            let by_step = error.discretisation.unwrap_or(0.0) > 0.5 * bias && view.can_halve_step();
+            Ok(if by_step {
+                Verdict::Refine
+            } else if noise < 0.1 * bias {
+                Verdict::Stop("floor")
+            } else {
+                Verdict::GoOn
+            })
+        } else {
+            Ok(Verdict::GoOn)
         }
-        Ok(None)
     }
 
     fn snapshot(&mut self, context: &DeviceContext, stopped_by: Option<&'static str>) -> Result<()> {

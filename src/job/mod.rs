@@ -8,95 +8,27 @@ mod develop;
 mod engine;
 mod field_run;
 mod live;
+mod report;
+mod resource;
 mod view_run;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
-use serde::Serialize;
-use serde_json::{Value, json};
+use serde_json::Value;
 use tokio::sync::watch;
 
 use crate::error::{Error, Result};
 use crate::film::{ErrorEstimate, Film};
-use crate::frame::Frame;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 
 pub use engine::{Engine, Readiness};
+pub use report::{Counts, Frame, State, Timings, TracePoint, Update};
 
 /// Points of the convergence trace that are kept; past this, every second one is dropped.
 const TRACE_POINTS: usize = 512;
-
-/// Where a render stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum State {
-    /// It waits for its first slice.
-    Queued,
-    /// It takes turns on the device.
-    Running,
-    /// The final frame is there.
-    Done,
-    /// It was cancelled.
-    Cancelled,
-    /// It failed; the resource says why.
-    Failed,
-}
-
-impl State {
-    /// Whether nothing more will come, unless a new camera sets a done render running again.
-    pub fn is_terminal(self) -> bool {
-        matches!(self, Self::Done | Self::Cancelled | Self::Failed)
-    }
-}
-
-/// One point of the convergence trace.
-#[derive(Debug, Clone, Copy, Serialize)]
-pub struct TracePoint {
-    /// Milliseconds since the render or its newest camera was asked for.
-    pub elapsed_ms: f64,
-    /// Samples per pixel of this frame.
-    pub samples: u32,
-    /// Its error.
-    pub error: f64,
-    /// Pixels a sample of this frame stands for, along a side.
-    pub stride: u32,
-}
-
-/// Times of a render, in milliseconds since it or its newest camera was asked for.
-#[derive(Debug, Clone, Copy, Default, Serialize)]
-pub struct Timings {
-    /// Until its first slice.
-    pub queued_ms: Option<f64>,
-    /// Until its first frame.
-    pub first_frame_ms: Option<f64>,
-    /// Time the device worked for it.
-    pub device_ms: f64,
-    /// Until its newest frame.
-    pub elapsed_ms: f64,
-}
-
-/// Counts of what must never be silent.
-#[derive(Debug, Clone, Copy, Default, Serialize)]
-pub struct Counts {
-    /// Samples that were not finite; each was taken as black.
-    pub non_finite_samples: u64,
-    /// Voxels of the volume that are not finite; they are rendered as empty.
-    pub non_finite_voxels: u64,
-    /// Channel values above 1 that the newest frame's PNG clips (the EXR has them).
-    pub clipped_values: u64,
-}
-
-/// What the watchers of a job see: its state and its latest frame.
-#[derive(Debug, Clone)]
-pub struct Update {
-    /// Where it stands.
-    pub state: State,
-    /// The latest frame, if there is one.
-    pub frame: Option<Arc<Frame>>,
-}
 
 /// What the device thread hands to the developer of a job's frames.
 pub(crate) struct Snapshot {
@@ -235,8 +167,10 @@ impl Job {
 
     /// Asks for the job to end; the device leaves it at its next slice. Says whether it was still going.
     pub(crate) fn cancel(&self) -> bool {
-        self.cancelled.store(true, Ordering::Release);
-        self.end(State::Cancelled, None)
+        // Not for one that has ended: a done render may yet get a new camera.
+        let ended = self.end(State::Cancelled, None);
+        self.cancelled.fetch_or(ended, Ordering::AcqRel);
+        ended
     }
 
     pub(crate) fn fail(&self, error: &Error) -> bool {
@@ -309,19 +243,21 @@ impl Job {
     }
 
     /// Publishes a frame of `snapshot`, and with the final one of the newest camera ends the job. `true` when it ended.
+    /// A frame of the camera before is worth showing while the newest has none: cameras may come faster than frames.
     pub(crate) fn publish(&self, snapshot: &Snapshot, png: Vec<u8>, error: ErrorEstimate, clipped: u64) -> bool {
         let mut progress = self.lock();
-        if progress.state.is_terminal() || snapshot.generation != progress.generation {
+        if progress.state.is_terminal() {
             return false;
         }
-        let ends = snapshot.stopped_by.is_some();
+        let newest = snapshot.generation == progress.generation;
+        let ends = newest && snapshot.stopped_by.is_some();
         progress.sequence += 1;
         progress.samples = snapshot.film.main.count;
         progress.error = Some(error);
         progress.film = Some(Arc::new(snapshot.film.clone()));
         progress.counts.clipped_values = clipped;
         progress.counts.non_finite_samples = snapshot.non_finite_samples;
-        progress.stopped_by = snapshot.stopped_by;
+        progress.stopped_by = snapshot.stopped_by.filter(|_| ends);
         progress.timings.elapsed_ms = snapshot.elapsed_ms;
         progress.timings.device_ms = snapshot.device_ms;
         let now = progress.asked.elapsed().as_secs_f64() * 1e3;
@@ -336,12 +272,14 @@ impl Job {
                 index % 2 == 1
             });
         }
-        progress.trace.push(TracePoint {
-            elapsed_ms: snapshot.elapsed_ms,
-            samples: snapshot.film.main.count,
-            error: error.total,
-            stride: snapshot.film.main.stride as u32,
-        });
+        if newest {
+            progress.trace.push(TracePoint {
+                elapsed_ms: snapshot.elapsed_ms,
+                samples: snapshot.film.main.count,
+                error: error.total,
+                stride: snapshot.film.main.stride as u32,
+            });
+        }
         if ends {
             progress.state = State::Done;
         }
@@ -366,44 +304,6 @@ impl Job {
         frame
             + progress.film.as_ref().map_or(0, |f| f.bytes())
             + progress.field.as_ref().map_or(0, |f| f.bytes() as usize)
-    }
-
-    /// A line of `GET /v1/renders`.
-    pub fn summary(&self) -> Value {
-        let p = self.lock();
-        json!({
-            "id": self.id, "state": p.state, "technique": p.scene.technique().name, "image": p.scene.image(),
-            "samples": p.samples, "error": p.error.map(|e| e.total), "created_unix_s": self.created_unix_s,
-        })
-    }
-
-    /// The render resource.
-    pub fn resource(&self) -> Value {
-        let p = self.lock();
-        let path = |rest: &str| format!("/v1/renders/{}{rest}", self.id);
-        json!({
-            "id": self.id,
-            "state": p.state,
-            "technique": p.scene.technique().name,
-            "request": self.request,
-            "camera": p.scene.camera().to_json(),
-            "image": {"width": p.scene.image()[0], "height": p.scene.image()[1]},
-            "plan": {"technique": p.scene.technique().name, "reasons": p.reasons, "budget": {
-                "samples": p.scene.budget().samples, "time_ms": p.scene.budget().time_ms, "max_error": p.scene.budget().max_error}},
-            "samples": p.samples,
-            "error": p.error.map(|e| e.total),
-            "error_parts": p.error,
-            "stopped_by": p.stopped_by,
-            "failure": p.failure,
-            "timings": p.timings,
-            "counts": p.counts,
-            "warnings": p.warnings,
-            "trace": p.trace,
-            "result": p.result,
-            "created_unix_s": self.created_unix_s,
-            "links": {"self": path(""), "frames": path("/frames"), "png": path("/frame.png"), "exr": path("/frame.exr"),
-                "events": path("/events"), "convergence": path("/convergence.svg"), "camera": path("/camera"), "field": path("/field")},
-        })
     }
 
     /// Its convergence trace.

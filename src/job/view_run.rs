@@ -19,6 +19,8 @@ use crate::volume::Volume;
 
 /// A pass is skipped as a preview when the picture itself is likely to take less than this.
 const QUICK_MS: f64 = 40.0;
+/// The shortest step that `max_error` leads to, in voxels: the shortest that a request may ask for.
+const LEAST_STEP_VOXELS: f64 = 0.05;
 /// Strides of preview, control and the passes proper.
 const PREVIEW: usize = 4;
 const CONTROL: usize = 2;
@@ -57,6 +59,7 @@ pub(super) struct ViewRun {
     pass: Option<Pass>,
     cursor: usize,
     wants_preview: bool,
+    least_step: f32,
     /// Device time since the start, and of the pass under way.
     pub device_time: Duration,
     pass_time: Duration,
@@ -87,7 +90,9 @@ impl ViewRun {
         let wants_preview = context.expected_ms(&plan.variant, size[0] * size[1]).is_none_or(|ms| ms > QUICK_MS);
         let voxels = context.volume(volume)?;
         let (pass, cursor, device_time, pass_time) = (None, 0, Duration::ZERO, Duration::ZERO);
+        let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
         Ok(Self {
+            least_step: (LEAST_STEP_VOXELS * smallest) as f32,
             plan,
             voxels,
             distances,
@@ -128,6 +133,20 @@ impl ViewRun {
     /// Samples per pixel of the passes proper.
     pub fn samples(&self) -> u32 {
         self.layers[index(Pass::Main)].samples
+    }
+
+    /// Whether the step is still longer than what a request may ask for.
+    pub fn can_halve_step(&self) -> bool {
+        self.plan.step >= 2.0 * self.least_step
+    }
+
+    /// Starts over with half the step: what was gathered has the error of the longer one. The passes proper of the longer step
+    /// would make a good control, but for their number; a fresh one costs an eighth of a pass.
+    pub fn halve_step(&mut self) {
+        self.plan.step *= 0.5;
+        self.layers.iter_mut().for_each(|layer| layer.samples = 0);
+        self.wants_preview = false;
+        (self.pass, self.cursor) = (None, 0);
     }
 
     pub fn plan(&self) -> &ViewPlan {

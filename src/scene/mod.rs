@@ -65,13 +65,22 @@ pub(crate) fn mean_side(volume: &Volume) -> f64 {
     (side(0) + side(1) + side(2)) / 3.0
 }
 
+/// The JSON Schema of a technique's own parameters under `limits`.
+pub fn parameters_schema(technique: &Technique, limits: &Limits) -> Value {
+    let mut schema = (technique.schema)();
+    if let Some(photons) = schema.pointer_mut("/properties/photons/maximum") {
+        *photons = limits.max_photons.into();
+    }
+    schema
+}
+
 /// The JSON Schema of a render request under `limits`: the shared fields and every technique's own.
 pub fn schema(limits: &Limits) -> Value {
     let mut schema = request::schema_of::<RenderRequest>();
     let names: Vec<&str> = technique::views().map(|t| t.name).collect();
     schema["properties"]["technique"]["enum"] = names.into();
     for t in technique::views() {
-        schema["properties"][t.name] = (t.schema)();
+        schema["properties"][t.name] = parameters_schema(t, limits);
     }
     schema["properties"]["volume"]["additionalProperties"] = false.into();
     for t in technique::fields() {

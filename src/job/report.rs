@@ -1,0 +1,97 @@
+//! What a job says of itself: state, times, counts, trace, the latest frame.
+
+use std::sync::Arc;
+
+use serde::Serialize;
+
+use crate::film::ErrorEstimate;
+
+/// Where a render stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum State {
+    /// It waits for its first slice.
+    Queued,
+    /// It takes turns on the device.
+    Running,
+    /// The final frame is there.
+    Done,
+    /// It was cancelled.
+    Cancelled,
+    /// It failed; the resource says why.
+    Failed,
+}
+
+impl State {
+    /// Whether nothing more will come, unless a new camera sets a done render running again.
+    pub fn is_terminal(self) -> bool {
+        matches!(self, Self::Done | Self::Cancelled | Self::Failed)
+    }
+}
+
+/// One point of the convergence trace.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct TracePoint {
+    /// Milliseconds since the render or its newest camera was asked for.
+    pub elapsed_ms: f64,
+    /// Samples per pixel of this frame.
+    pub samples: u32,
+    /// Its error.
+    pub error: f64,
+    /// Pixels a sample of this frame stands for, along a side.
+    pub stride: u32,
+}
+
+/// Times of a render, in milliseconds since it or its newest camera was asked for.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct Timings {
+    /// Until its first slice.
+    pub queued_ms: Option<f64>,
+    /// Until its first frame.
+    pub first_frame_ms: Option<f64>,
+    /// Time the device worked for it.
+    pub device_ms: f64,
+    /// Until its newest frame.
+    pub elapsed_ms: f64,
+}
+
+/// Counts of what must never be silent.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct Counts {
+    /// Samples that were not finite; each was taken as black.
+    pub non_finite_samples: u64,
+    /// Voxels of the volume that are not finite; they are rendered as empty.
+    pub non_finite_voxels: u64,
+    /// Channel values above 1 that the newest frame's PNG clips (the EXR has them).
+    pub clipped_values: u64,
+}
+
+/// What the watchers of a job see: its state and its latest frame.
+#[derive(Debug, Clone)]
+pub struct Update {
+    /// Where it stands.
+    pub state: State,
+    /// The latest frame, if there is one.
+    pub frame: Option<Arc<Frame>>,
+}
+
+/// One encoded frame and what it says of itself.
+#[derive(Debug, Clone)]
+pub struct Frame {
+    /// Counts the render's frames from 1; also the id of its event.
+    pub sequence: u64,
+    /// PNG bytes.
+    pub png: bytes::Bytes,
+    /// Samples per pixel.
+    pub samples: u32,
+    /// The error and its parts.
+    pub error: ErrorEstimate,
+    /// Milliseconds since the render (or its newest camera) was asked for.
+    pub elapsed_ms: f64,
+    /// Milliseconds of device time so far.
+    pub device_ms: f64,
+    /// Whether no better frame will follow.
+    pub is_final: bool,
+    /// Strong entity tag: the hash of the bytes, which hold nothing that depends on load or time.
+    pub etag: String,
+}

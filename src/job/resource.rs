@@ -1,0 +1,45 @@
+//! The render resource of the HTTP contract.
+
+use serde_json::{Value, json};
+
+use super::Job;
+
+impl Job {
+    /// A line of `GET /v1/renders`.
+    pub fn summary(&self) -> Value {
+        let p = self.lock();
+        json!({
+            "id": self.id, "state": p.state, "technique": p.scene.technique().name, "image": p.scene.image(),
+            "samples": p.samples, "error": p.error.map(|e| e.total), "created_unix_s": self.created_unix_s,
+        })
+    }
+
+    /// The render resource.
+    pub fn resource(&self) -> Value {
+        let p = self.lock();
+        let path = |rest: &str| format!("/v1/renders/{}{rest}", self.id);
+        json!({
+            "id": self.id,
+            "state": p.state,
+            "technique": p.scene.technique().name,
+            "request": self.request,
+            "camera": p.scene.camera().to_json(),
+            "image": {"width": p.scene.image()[0], "height": p.scene.image()[1]},
+            "plan": {"technique": p.scene.technique().name, "reasons": p.reasons, "budget": {
+                "samples": p.scene.budget().samples, "time_ms": p.scene.budget().time_ms, "max_error": p.scene.budget().max_error}},
+            "samples": p.samples,
+            "error": p.error.map(|e| e.total),
+            "error_parts": p.error,
+            "stopped_by": p.stopped_by,
+            "failure": p.failure,
+            "timings": p.timings,
+            "counts": p.counts,
+            "warnings": p.warnings,
+            "trace": p.trace,
+            "result": p.result,
+            "created_unix_s": self.created_unix_s,
+            "links": {"self": path(""), "frames": path("/frames"), "png": path("/frame.png"), "exr": path("/frame.exr"),
+                "events": path("/events"), "convergence": path("/convergence.svg"), "camera": path("/camera"), "field": path("/field")},
+        })
+    }
+}

@@ -1,0 +1,143 @@
+//! The device: structs lie as on the host, every variant builds without a warning, and a tiny case of each kernel runs clean
+//! under oclgrind.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test says what is wrong by panicking")]
+
+mod common;
+
+use std::path::Path;
+use std::process::Command;
+
+use cloudchamber::device::program::{Source, Variant};
+use cloudchamber::device::structs::{DeviceStruct, View};
+use cloudchamber::device::{self, Device, DeviceConfig};
+use cloudchamber::technique::emission_absorption::EmissionAbsorption;
+use cloudchamber::technique::photon_transport::{FieldPass, PhotonTransport};
+use cloudchamber::technique::{self};
+
+fn open(lanes: Option<u32>, kernels: Option<&Path>) -> Device {
+    device::keep_compiled_kernels_in(&common::kernel_cache()).unwrap();
+    Device::open(&DeviceConfig { wish: "pocl".into(), lanes, kernels: kernels.map(Path::to_owned) }).unwrap()
+}
+
+/// The offsets of every field and the size, as the device's compiler sees them.
+fn offsets_on_the_device<T: DeviceStruct>() -> Vec<usize> {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = "kernel void offsets(global int *out) {\n    if (get_global_id(0) > 0) return;\n".to_owned();
+    for (i, (field, _)) in T::offsets().iter().enumerate() {
+        text += &format!("    out[{i}] = (int)__builtin_offsetof({}, {field});\n", T::NAME);
+    }
+    text += &format!("    out[{}] = (int)sizeof({});\n}}\n", T::offsets().len(), T::NAME);
+    std::fs::write(folder.path().join("offsets.cl"), text).unwrap();
+    let mut device = open(None, Some(folder.path()));
+    let source = Source { kernel: "offsets", headers: &[], structs: T::opencl_text, arguments: 1, variants: Vec::new };
+    let variant = Variant { kernel: "offsets", voxel: None, features: &[] };
+    device.build(&source, &variant).unwrap();
+    let mut out = vec![-1i32; T::offsets().len() + 1];
+    let buffer = device.upload(bytemuck::cast_slice(&out), 0).unwrap();
+    device.run(&variant, &[&buffer], 0, 1).unwrap();
+    device.read(&buffer, 0, &mut out).unwrap();
+    out.into_iter().map(|v| usize::try_from(v).unwrap()).collect()
+}
+
+fn same_on_both_sides<T: DeviceStruct>() {
+    let mut host: Vec<usize> = T::offsets().iter().map(|(_, offset)| *offset).collect();
+    host.push(size_of::<T>());
+    assert_eq!(offsets_on_the_device::<T>(), host, "{}", T::NAME);
+}
+
+#[test]
+fn structs_lie_the_same_on_host_and_device() {
+    same_on_both_sides::<View>();
+    same_on_both_sides::<EmissionAbsorption>();
+    same_on_both_sides::<FieldPass>();
+    same_on_both_sides::<PhotonTransport>();
+}
+
+#[test]
+fn every_variant_builds_with_warnings_as_errors() {
+    for lanes in [1, 4, 8, 16] {
+        let mut device = open(Some(lanes), None);
+        for t in technique::ALL {
+            let source = (t.source)();
+            for variant in (source.variants)() {
+                assert!(variant.options(lanes).contains("-Werror"));
+                device
+                    .build(&source, &variant)
+                    .unwrap_or_else(|e| panic!("{} with {lanes} lanes: {e}", variant.label()));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_warning_fails_the_build() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(
+        folder.path().join("sloppy.cl"),
+        "kernel void sloppy(global int *out) { int *p = 1.5f > 1 ? out : 0; }",
+    )
+    .unwrap();
+    let mut device = open(None, Some(folder.path()));
+    let source = Source { kernel: "sloppy", headers: &[], structs: String::new, arguments: 1, variants: Vec::new };
+    let variant = Variant { kernel: "sloppy", voxel: None, features: &[] };
+    assert!(device.build(&source, &variant).is_err());
+}
+
+/// Runs a scene on oclgrind and returns what it logged. It exits 0 with errors in its log, and without the dylib's path the
+/// run would silently happen on PoCL.
+fn oclgrind(scene: &str, lanes: &str, kernels: Option<&Path>) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let (file, log) = (folder.path().join("scene.json"), folder.path().join("log"));
+    std::fs::write(&file, scene).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_cloudchamber"));
+    command.arg("render").arg(&file).args(["--device", "oclgrind", "--lanes", lanes, "--data-dir"]).arg(folder.path());
+    command.arg("-o").arg(folder.path().join("out.png"));
+    if let Some(kernels) = kernels {
+        command.arg("--kernels").arg(kernels);
+    }
+    let output = command
+        .env("OPENCL_DYLIB_PATH", "/usr/lib/oclgrind/liboclgrind-rt.so")
+        .env("OCLGRIND_LOG", &log)
+        .env("OCLGRIND_DATA_RACES", "1")
+        // Inlining leaves an intrinsic in the code that oclgrind 21.10 does not know.
+        .env("OCLGRIND_BUILD_OPTIONS", "-cl-opt-disable")
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    std::fs::read_to_string(log).unwrap_or_default()
+}
+
+const VIEW: &str = r#"{"technique": "emission_absorption", "volume": {"builtin": "sphere", "resolution": 12},
+    "image": {"width": 9, "height": 7}, "budget": {"samples": 2}, "emission_absorption": {"shading": true}}"#;
+const FIELD: &str = r#"{"technique": "emission_absorption", "volume": {"photon_transport": {"photons": 70, "grid": [6, 5, 4]}},
+    "image": {"width": 5, "height": 4}, "budget": {"samples": 1}}"#;
+
+#[test]
+fn a_tiny_case_of_each_kernel_is_clean_under_oclgrind() {
+    for lanes in ["1", "4"] {
+        for scene in [VIEW, FIELD] {
+            assert_eq!(oclgrind(scene, lanes, None).trim(), "", "{lanes} lanes: {scene}");
+        }
+    }
+}
+
+#[test]
+fn oclgrind_would_see_a_stray_store() {
+    let folder = tempfile::tempdir().unwrap();
+    let copy = |name: &str| {
+        let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("kernels").join(name);
+        std::fs::create_dir_all(folder.path().join(name).parent().unwrap()).unwrap();
+        let text = std::fs::read_to_string(from).unwrap();
+        // A pixel too far.
+        let broken = text.replace("film[4 * pixels + pixel] = m2;", "film[5 * pixels + pixel] = m2;");
+        std::fs::write(folder.path().join(name), broken).unwrap();
+    };
+    for name in ["lanes.h", "rng.h", "camera.h", "volume.h", "film.h"] {
+        copy(&format!("shared/{name}"));
+    }
+    copy("emission_absorption.cl");
+    copy("photon_transport.cl");
+    let log = oclgrind(VIEW, "1", Some(folder.path()));
+    assert!(log.contains("Invalid write"), "the log is: {log}");
+}

@@ -1,0 +1,146 @@
+//! The house's own rules: layers, file sizes, and a README that works as written.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test says what is wrong by panicking")]
+
+mod common;
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {
+        let path = entry.path();
+        if path.is_dir() {
+            found.extend(files(&path, extension));
+        } else if path.extension().is_some_and(|e| e == extension) {
+            found.push(path);
+        }
+    }
+    found
+}
+
+/// The source files below `src` that mention any of `words` outside of comments.
+fn mentioning(words: &[&str]) -> Vec<String> {
+    let src = root().join("src");
+    let says = |path: &PathBuf| {
+        let text = std::fs::read_to_string(path).unwrap();
+        text.lines().filter(|l| !l.trim_start().starts_with("//")).any(|l| words.iter().any(|w| l.contains(w)))
+    };
+    files(&src, "rs").iter().filter(|p| says(p)).map(|p| p.strip_prefix(&src).unwrap().display().to_string()).collect()
+}
+
+#[test]
+fn axum_lives_in_http_only() {
+    let outside: Vec<_> =
+        mentioning(&["axum::", "tower_http::"]).into_iter().filter(|f| !f.starts_with("http/")).collect();
+    assert!(outside.is_empty(), "{outside:?}");
+    assert!(!mentioning(&["axum::"]).is_empty(), "the test looks for something that is there");
+}
+
+#[test]
+fn opencl_and_unsafe_live_in_device_only() {
+    let words = ["opencl3", "cl3::", "unsafe {", "unsafe fn", "unsafe impl"];
+    let outside: Vec<_> = mentioning(&words).into_iter().filter(|f| !f.starts_with("device/")).collect();
+    assert!(outside.is_empty(), "{outside:?}");
+    assert!(!mentioning(&["opencl3"]).is_empty(), "the test looks for something that is there");
+}
+
+/// The way of the data: what stands to the left is not used by what stands to the right.
+#[test]
+fn layers_point_one_way() {
+    let order = ["http", "job", "scene", "technique", "device", "film", "frame", "volume", "error"];
+    let place = |module: &str| order.iter().position(|m| *m == module);
+    let mut wrong = Vec::new();
+    for path in files(&root().join("src"), "rs") {
+        let file = path.strip_prefix(root().join("src")).unwrap().display().to_string();
+        let module = file.split(['/', '.']).next().unwrap().to_owned();
+        // A scene holds its techniques and a technique is told of cameras: these two are one layer.
+        let Some(own) = place(&module) else { continue };
+        for line in std::fs::read_to_string(&path).unwrap().lines().filter(|l| !l.trim_start().starts_with("//")) {
+            for (left, name) in order.iter().enumerate().take(own) {
+                let one_layer = module == "technique" && *name == "scene";
+                if left < own && !one_layer && line.contains(&format!("crate::{name}::")) {
+                    wrong.push(format!("{file} uses {name}: {line}"));
+                }
+            }
+        }
+    }
+    // The programs of the device know voxel types by name; structs of a view live beside the macro.
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn every_technique_has_its_three_files() {
+    for t in cloudchamber::technique::ALL {
+        for file in
+            [format!("src/technique/{}.rs", t.name), format!("kernels/{}.cl", t.name), format!("tests/{}.rs", t.name)]
+        {
+            assert!(root().join(&file).is_file(), "{file} is missing");
+        }
+    }
+}
+
+#[test]
+fn the_map_of_the_house_names_every_module() {
+    let map = std::fs::read_to_string(root().join("src/lib.rs")).unwrap();
+    for module in map.lines().filter_map(|l| l.strip_prefix("pub mod ")?.strip_suffix(';')) {
+        assert!(map.contains(&format!("[`{module}`]")), "src/lib.rs does not say what {module} is");
+    }
+}
+
+#[test]
+fn no_file_grows_past_its_job() {
+    for (folder, extension) in [("src", "rs"), ("kernels", "cl"), ("kernels", "h"), ("static", "js"), ("tests", "rs")] {
+        for path in files(&root().join(folder), extension) {
+            let lines = std::fs::read_to_string(&path).unwrap().lines().count();
+            assert!(lines <= 400, "{} has {lines} lines: split it", path.display());
+        }
+    }
+}
+
+/// The `sh` blocks of the README that call curl.
+fn curl_examples() -> Vec<String> {
+    let readme = std::fs::read_to_string(root().join("README.md")).unwrap();
+    let blocks = readme.split("```sh\n").skip(1).filter_map(|b| b.split("```").next());
+    blocks.filter(|b| b.contains("curl ")).map(str::to_owned).collect()
+}
+
+#[test]
+fn the_readmes_curl_examples_work_as_written() {
+    let examples = curl_examples();
+    assert!(examples.len() >= 5, "the README has {} curl examples", examples.len());
+    let server = common::Server::start();
+    let folder = tempfile::tempdir().unwrap();
+    let mri =
+        std::env::var("CLOUDCHAMBER_TEST_MRI").unwrap_or_else(|_| "/usr/share/mricron/templates/ch2.nii.gz".into());
+    std::fs::copy(&mri, folder.path().join("ch2.nii.gz")).unwrap();
+    // A newcomer has patience; a test has two minutes a call.
+    std::fs::write(folder.path().join(".curlrc"), "max-time = 120\n").unwrap();
+    // One shell for all: an example may use what one before it has set. `CC` is the address that the README sets itself.
+    let script = format!("set -eu\n{}", examples.join("\n"));
+    let output = Command::new("bash")
+        .args(["-c", &script])
+        .env("CURL_HOME", folder.path())
+        .current_dir(folder.path())
+        .env("CC", server.url())
+        .output()
+        .unwrap();
+    let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{script}\n{out}\n{err}");
+    assert!(!out.contains("\"status\":4") && !out.contains("\"status\":5"), "{out}");
+    let mut pictures = 0;
+    for entry in std::fs::read_dir(folder.path()).unwrap().map(Result::unwrap) {
+        if entry.path().extension().is_some_and(|e| e == "png") {
+            let picture = image::open(entry.path()).unwrap().to_rgb8();
+            let first = picture.get_pixel(0, 0);
+            assert!(picture.pixels().any(|p| p != first), "{} is of one colour", entry.path().display());
+            pictures += 1;
+        }
+    }
+    assert!(pictures >= 2, "the examples made {pictures} pictures");
+}
