@@ -1,0 +1,58 @@
+// The server's transfer function presets as points, so that they can be seen over the histogram and an edit can start
+// from them. The same numbers as src/scene/transfer.rs, which is what renders; no DOM.
+
+import { colorOf } from './curve.js';
+
+const OPTICAL_DEPTH = 24; // of a preset's opacity 1 across the volume's mean side
+const HLS_POINTS = 24;
+
+/** [place, sRGB, opacity]; places are fractions of the range of values. */
+const RAMP = [[0, '#1a1a80', 0], [0.5, '#e08040', 0.5], [1, '#fff8e0', 1]];
+const MRI_HEAD = [
+  [0, '#000000', 0], [0.13, '#5a2e22', 0], [0.22, '#b0694a', 0.1], [0.34, '#c98f70', 0.16],
+  [0.5, '#d8b49a', 0.4], [0.65, '#f0dcc8', 1], [1, '#ffffff', 2],
+];
+const CT_BONE = [
+  [0, '#000000', 0], [0.3, '#6a2a1c', 0], [0.42, '#a8583c', 0.06], [0.55, '#d8b890', 0.9], [0.75, '#f4ead2', 3], [1, '#ffffff', 6],
+];
+/** Places in Hounsfield units. */
+const CT_BONE_HOUNSFIELD = [
+  [-1000, '#000000', 0], [120, '#6a2a1c', 0], [220, '#b07850', 0.2], [450, '#e0c8a0', 1.5], [1000, '#f6eedc', 4], [2000, '#ffffff', 6],
+];
+
+const isHounsfield = ([low, high]) => low <= -500 && high >= 600;
+
+/** The preset that the server takes where a request names none. */
+export function suitingPreset(format, range) {
+  if (format === 'builtin' || format === 'field') return 'ramp';
+  return isHounsfield(range) ? 'ct_bone' : 'mri_head';
+}
+
+/**
+ * @param {string} name
+ * @param {{range: [number, number], meanSide: number}} volume
+ * @param {{rotation?: number, exponent?: number}} own what the preset takes besides
+ */
+export function presetPoints(name, { range: [low, high], meanSide }, { rotation = 0, exponent = 2 } = {}) {
+  const full = OPTICAL_DEPTH / meanSide;
+  const point = (value, color, opacity) => ({
+    value: Number(value.toPrecision(4)), color, opacity_per_unit: Number((opacity * full).toPrecision(4)),
+  });
+  if (name === 'hls') {
+    return Array.from({ length: HLS_POINTS + 1 }, (_, i) => i / HLS_POINTS)
+      .map((v) => point(v * (high > 0 ? high : 1), colorOf(hue(v + rotation)), v ** exponent));
+  }
+  if (name === 'ct_bone' && isHounsfield([low, high])) {
+    return CT_BONE_HOUNSFIELD.map(([value, color, opacity]) => point(value, colorOf(color), opacity));
+  }
+  const shape = { mri_head: MRI_HEAD, ct_bone: CT_BONE }[name] ?? RAMP;
+  return shape.map(([place, color, opacity]) => point(low + (high - low || 1) * place, colorOf(color), opacity));
+}
+
+/** The pure hue of a turn, as "#rrggbb". */
+function hue(turn) {
+  return `#${[0, -1 / 3, -2 / 3].map((shift) => {
+    const t = ((((turn + shift) % 1) + 1) % 1) * 6;
+    return Math.round(255 * Math.max(0, Math.min(1, Math.abs(t - 3) - 1))).toString(16).padStart(2, '0');
+  }).join('')}`;
+}
