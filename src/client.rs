@@ -137,7 +137,8 @@ async fn refusal(response: reqwest::Response) -> Error {
 /// # Errors
 /// [`Error::Unavailable`] with the reason.
 pub async fn healthcheck(base: &str) -> Result<()> {
-    let client = reqwest::Client::builder().timeout(Duration::from_secs(5)).build().map_err(Error::internal)?;
+    let client =
+        reqwest::Client::builder().timeout(Duration::from_secs(5)).no_proxy().build().map_err(Error::internal)?;
     let url = format!("{}/healthz", base.trim_end_matches('/'));
     let response = client.get(&url).send().await.map_err(|e| Error::Unavailable(format!("{url}: {e}")))?;
     if response.status().is_success() {

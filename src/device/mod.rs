@@ -66,17 +66,29 @@ fn cl<T>(doing: &str, result: std::result::Result<T, opencl3::error_codes::ClErr
     result.map_err(|e| Error::internal(format!("OpenCL, {doing}: {e}")))
 }
 
-/// Points PoCL's compiled-kernel cache at `cache`, unless the environment names one already.
+/// Points PoCL's compiled-kernel cache at `cache`, unless the environment names one already, and makes sure that code can be
+/// run from there: PoCL itself would crash later.
 /// Call before any thread is started and before OpenCL is first used.
 ///
 /// # Errors
-/// [`Error::Internal`] when the folder cannot be made.
+/// [`Error::Internal`] when the folder cannot be made, or is on a file system mounted `noexec`.
 pub fn keep_compiled_kernels_in(cache: &Path) -> Result<()> {
-    std::fs::create_dir_all(cache).map_err(|e| Error::internal(format!("kernel cache {}: {e}", cache.display())))?;
-    if std::env::var_os("POCL_CACHE_DIR").is_none() {
-        // SAFETY: called from main before any other thread exists, so nobody reads the environment at the same time.
-        unsafe { std::env::set_var("POCL_CACHE_DIR", cache) };
+    let cache = std::env::var_os("POCL_CACHE_DIR").map_or_else(|| cache.to_owned(), PathBuf::from);
+    let said = |e: std::io::Error| Error::internal(format!("kernel cache {}: {e}", cache.display()));
+    std::fs::create_dir_all(&cache).map_err(said)?;
+    let probe = cache.join(format!("probe-{}", std::process::id()));
+    std::fs::write(&probe, "#!/bin/sh\nexit 0\n").map_err(said)?;
+    let runs = std::fs::set_permissions(&probe, std::os::unix::fs::PermissionsExt::from_mode(0o700))
+        .and_then(|()| std::process::Command::new(&probe).status());
+    std::fs::remove_file(&probe).map_err(said)?;
+    if let Err(cause) = runs {
+        return Err(Error::internal(format!(
+            "kernel cache {}: nothing can be run from there ({cause})",
+            cache.display()
+        )));
     }
+    // SAFETY: called from main before any other thread exists, so nobody reads the environment at the same time.
+    unsafe { std::env::set_var("POCL_CACHE_DIR", cache) };
     Ok(())
 }
 

@@ -218,10 +218,9 @@ const VARIANT: Variant = Variant { kernel: TECHNIQUE.name, voxel: None, features
 
 fn parse(parameters: &Value, at: &str) -> Result<Arc<dyn Field>> {
     let p: Parameters = request::parse(parameters, &(TECHNIQUE.schema)(), at)?;
-    let position = p.position_mm();
-    for axis in 0..3 {
-        if !(0.0..=p.size_mm[axis]).contains(&position[axis]) {
-            let permitted = format!("0 to {} (size_mm)", p.size_mm[axis]);
+    for (axis, (place, size)) in p.position_mm().into_iter().zip(p.size_mm).enumerate() {
+        if !(0.0..=size).contains(&place) {
+            let permitted = format!("0 to {size} (size_mm)");
             return Err(Error::invalid(format!("{at}/source/position_mm/{axis}"), "outside the box", permitted));
         }
     }
