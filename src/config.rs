@@ -90,8 +90,11 @@ pub struct Limits {
     /// Finished renders that stay readable
     #[arg(long, env = "CLOUDCHAMBER_KEEP_RENDERS", default_value_t = 128)]
     pub keep_renders: usize,
+    /// Most bytes of finished films kept in memory for EXR; past this the oldest keep their PNG only
+    #[arg(long, env = "CLOUDCHAMBER_KEEP_FILM_BYTES", default_value_t = 48 << 20)]
+    pub keep_film_bytes: usize,
     /// Most bytes of finished pictures kept in memory
-    #[arg(long, env = "CLOUDCHAMBER_KEEP_BYTES", default_value_t = 256 << 20)]
+    #[arg(long, env = "CLOUDCHAMBER_KEEP_BYTES", default_value_t = 128 << 20)]
     pub keep_bytes: usize,
 }
 

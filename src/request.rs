@@ -11,6 +11,9 @@ use serde_json::{Map, Value, json};
 
 use crate::error::{Error, Result, Violation};
 
+/// The largest whole number that every JSON reader carries exactly: 2^53 - 1.
+pub const LARGEST_WHOLE: i64 = 9_007_199_254_740_991;
+
 /// The body of `POST /v1/renders`, less the techniques' own parameters.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 pub struct RenderRequest {
@@ -25,7 +28,7 @@ pub struct RenderRequest {
     /// When to stop: whichever is reached first. Default: the technique's own number of samples.
     pub budget: Option<BudgetRequest>,
     /// Keys every random number of the render.
-    #[schemars(range(min = 0))]
+    #[schemars(range(min = 0, max = 9_007_199_254_740_991u64))]
     pub seed: Option<u64>,
     /// The techniques' own parameters, by technique.
     #[serde(flatten)]
@@ -44,7 +47,7 @@ pub struct VolumeRequest {
     #[schemars(range(min = 8, max = 512))]
     pub resolution: Option<u32>,
     /// Seed of a built-in volume that is made of random numbers.
-    #[schemars(range(min = 0))]
+    #[schemars(range(min = 0, max = 9_007_199_254_740_991u64))]
     pub seed: Option<u64>,
     /// A field technique's parameters, by technique.
     #[serde(flatten)]
@@ -118,8 +121,22 @@ pub fn schema_of<T: JsonSchema>() -> Value {
 /// [`Error::Invalid`] with every violation, each with its pointer and the permitted range.
 pub fn parse<T: DeserializeOwned>(value: &Value, schema: &Value, at: &str) -> Result<T> {
     check(value, schema, at)?;
-    T::deserialize(value)
+    let value = with_whole_numbers(value);
+    T::deserialize(&value)
         .map_err(|e| Error::invalid(at, e.to_string(), "see the schema in /v1/techniques and /openapi.json"))
+}
+
+/// The same JSON with `16.0` as `16`: to JSON Schema both are integers, to serde only the second is.
+fn with_whole_numbers(value: &Value) -> Value {
+    match value {
+        Value::Number(n) => match n.as_f64() {
+            Some(v) if n.is_f64() && v.fract() == 0.0 && v.abs() <= LARGEST_WHOLE as f64 => json!(v as i64),
+            _ => value.clone(),
+        },
+        Value::Array(items) => items.iter().map(with_whole_numbers).collect(),
+        Value::Object(fields) => fields.iter().map(|(k, v)| (k.clone(), with_whole_numbers(v))).collect(),
+        other => other.clone(),
+    }
 }
 
 /// Checks `value` against `schema` only.

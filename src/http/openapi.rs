@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use axum::Json;
-use axum::extract::{Path, State};
-use axum::http::header;
+use axum::extract::State;
+use axum::http::{Uri, header};
 use axum::response::{IntoResponse, Redirect, Response};
 use serde_json::{Map, Value, json};
 
@@ -216,8 +216,8 @@ pub(super) async fn docs_root() -> Redirect {
 }
 
 /// The readable form of the document.
-pub(super) async fn docs(path: Option<Path<String>>) -> Result<Response> {
-    let name = path.map_or(String::new(), |Path(p)| p);
+pub(super) async fn docs(uri: Uri) -> Result<Response> {
+    let name = uri.path().trim_start_matches("/docs").trim_start_matches('/').to_owned();
     let config = Arc::new(utoipa_swagger_ui::Config::from("/openapi.json"));
     let file = utoipa_swagger_ui::serve(&name, config).map_err(Error::internal)?;
     let file = file.ok_or_else(|| Error::NotFound { what: "page", id: name.chars().take(100).collect() })?;

@@ -3,6 +3,8 @@
 use std::time::Duration;
 
 use axum::body::{Body, Bytes};
+use axum::extract::{FromRequestParts, Path};
+use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderValue, Request, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use futures_util::StreamExt;
@@ -49,6 +51,19 @@ impl IntoResponse for Error {
             _ => {}
         }
         response
+    }
+}
+
+/// The last part of a path, decoded; one that is not UTF-8 names nothing.
+pub struct Id(pub String);
+
+impl<S: Send + Sync> FromRequestParts<S> for Id {
+    type Rejection = Error;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self> {
+        let missing = |_| Error::NotFound { what: "path", id: parts.uri.path().chars().take(100).collect() };
+        let path = Path::<String>::from_request_parts(&mut parts.clone(), state).await;
+        path.map(|Path(id)| Self(id)).map_err(missing)
     }
 }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use axum::Json;
 use axum::body::Body;
-use axum::extract::{Path, Query, State};
+use axum::extract::{Query, State};
 use axum::http::{HeaderMap, Request, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use headers::HeaderMapExt;
@@ -12,7 +12,8 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::accept::negotiate;
-use super::{App, problem, streams};
+use super::problem::{self, Id};
+use super::{App, streams};
 use crate::error::{Error, Result};
 use crate::frame;
 use crate::job::{Frame, Job, State as JobState};
@@ -27,11 +28,6 @@ pub(super) async fn create(State(app): State<App>, request: Request<Body>) -> Re
     let headers = request.headers().clone();
     let answer = negotiate(&headers, &OFFERS)?;
     let body = problem::read_json(request, app.limits.max_json_bytes, app.request_timeout).await?;
-    // A place in the queue is looked for before anything is loaded for the request; `submit` looks again.
-    if !app.engine.has_room() {
-        let waiting = app.engine.unfinished();
-        return Err(Error::QueueFull { waiting, retry_after_s: 1 + waiting as u64 / 16 });
-    }
     let (job, fresh) = submit(&app, &headers, body).await?;
     let location = format!("/v1/renders/{}", job.id());
     let mut response = match answer {
@@ -64,6 +60,11 @@ async fn submit(app: &App, headers: &HeaderMap, body: Value) -> Result<(Arc<Job>
         && let Some(job) = remembered(app, key)?
     {
         return Ok((job, false));
+    }
+    // A place in the queue is looked for before anything is loaded for the request; the engine's `submit` looks again.
+    if !app.engine.has_room() {
+        let waiting = app.engine.unfinished();
+        return Err(Error::QueueFull { waiting, retry_after_s: 1 + waiting as u64 / 16 });
     }
     // Decoding a volume or making a built-in takes a while: not on the runtime's own threads.
     let scene = tokio::task::spawn_blocking({
@@ -120,6 +121,7 @@ async fn wait_for(app: &App, job: &Job, last: bool) -> Result<Arc<Frame>> {
         match (update.state, update.frame) {
             (JobState::Done, Some(frame)) => return Ok(frame),
             (JobState::Failed, _) => return Err(Error::internal("the render failed")),
+            (JobState::Cancelled, Some(frame)) if !last => return Ok(frame),
             (JobState::Cancelled, _) => return Err(Error::Conflict("the render was cancelled".into())),
             (_, Some(frame)) if !last => return Ok(frame),
             _ => {}
@@ -158,7 +160,8 @@ fn png_response(frame: &Frame) -> Response {
 }
 
 async fn exr_response(job: Arc<Job>, frame: &Frame) -> Result<Response> {
-    let (film, error) = job.film().ok_or_else(|| Error::NotFound { what: "frame of render", id: job.id().into() })?;
+    let (film, error) =
+        job.film().ok_or_else(|| Error::NotFound { what: "film any more of render", id: job.id().into() })?;
     let bytes = tokio::task::spawn_blocking(move || film.exr(&error)).await.map_err(Error::internal)??;
     let etag = frame::etag(&bytes);
     Ok(with_frame_headers(([(header::CONTENT_TYPE, "image/x-exr")], bytes).into_response(), frame, &etag))
@@ -174,23 +177,19 @@ pub(super) async fn list(State(app): State<App>) -> Json<Value> {
 }
 
 /// `GET /v1/renders/{id}`.
-pub(super) async fn show(State(app): State<App>, Path(id): Path<String>) -> Result<Json<Value>> {
+pub(super) async fn show(State(app): State<App>, Id(id): Id) -> Result<Json<Value>> {
     Ok(Json(find(&app, &id)?.resource()))
 }
 
 /// `DELETE /v1/renders/{id}`.
-pub(super) async fn cancel(State(app): State<App>, Path(id): Path<String>) -> Result<Json<Value>> {
+pub(super) async fn cancel(State(app): State<App>, Id(id): Id) -> Result<Json<Value>> {
     let job = find(&app, &id)?;
     app.engine.cancel(&job);
     Ok(Json(job.resource()))
 }
 
 /// `PUT /v1/renders/{id}/camera`.
-pub(super) async fn set_camera(
-    State(app): State<App>,
-    Path(id): Path<String>,
-    request: Request<Body>,
-) -> Result<Json<Value>> {
+pub(super) async fn set_camera(State(app): State<App>, Id(id): Id, request: Request<Body>) -> Result<Json<Value>> {
     let job = find(&app, &id)?;
     let body = problem::read_json(request, app.limits.max_json_bytes, app.request_timeout).await?;
     let camera = job.camera_from_json(&body)?;
@@ -220,14 +219,10 @@ fn unchanged(headers: &HeaderMap, etag: &str) -> bool {
     headers.typed_get::<headers::IfNoneMatch>().zip(tag).is_some_and(|(seen, tag)| !seen.precondition_passes(&tag))
 }
 
-type FrameRequest = (
-    State<App>,
-    Path<String>,
-    std::result::Result<Query<FrameQuery>, axum::extract::rejection::QueryRejection>,
-    HeaderMap,
-);
+type FrameRequest =
+    (State<App>, Id, std::result::Result<Query<FrameQuery>, axum::extract::rejection::QueryRejection>, HeaderMap);
 
-async fn newest((State(app), Path(id), query, _): &FrameRequest) -> Result<(Arc<Job>, Arc<Frame>)> {
+async fn newest((State(app), Id(id), query, _): &FrameRequest) -> Result<(Arc<Job>, Arc<Frame>)> {
     let job = find(app, id)?;
     let last = query.as_ref().map_err(|e| Error::Malformed(e.body_text()))?.last()?;
     let _permit = app.stream_permit()?;
@@ -256,7 +251,7 @@ pub(super) async fn frame_exr(request: FrameRequest) -> Result<Response> {
 }
 
 /// `GET /v1/renders/{id}/field`.
-pub(super) async fn field(State(app): State<App>, Path(id): Path<String>) -> Result<Response> {
+pub(super) async fn field(State(app): State<App>, Id(id): Id) -> Result<Response> {
     let job = find(&app, &id)?;
     let grid = job.field().ok_or_else(|| Error::NotFound { what: "field of render", id: job.id().into() })?;
     let bytes = tokio::task::spawn_blocking(move || volume::write_nrrd(&grid)).await.map_err(Error::internal)?;
@@ -269,7 +264,7 @@ pub(super) async fn field(State(app): State<App>, Path(id): Path<String>) -> Res
 }
 
 /// `GET /v1/renders/{id}/convergence.svg`.
-pub(super) async fn convergence(State(app): State<App>, Path(id): Path<String>) -> Result<Response> {
+pub(super) async fn convergence(State(app): State<App>, Id(id): Id) -> Result<Response> {
     let job = find(&app, &id)?;
     let state = format!("{:?}", job.state()).to_lowercase();
     let svg = chart::convergence(&job.trace(), &state)?;

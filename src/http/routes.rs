@@ -2,7 +2,7 @@
 
 use axum::Router;
 use axum::extract::MatchedPath;
-use axum::http::{HeaderValue, Method, Request, header};
+use axum::http::{HeaderName, HeaderValue, Method, Request, header};
 use axum::middleware::{self, Next};
 use axum::response::Response;
 use axum::routing::{get, post, put};
@@ -63,13 +63,22 @@ fn cors(origins: &[String]) -> Result<CorsLayer> {
     Ok(CorsLayer::new()
         .allow_origin(AllowOrigin::list(origins))
         .allow_methods([Method::GET, Method::POST, Method::PUT, Method::DELETE])
-        .allow_headers([header::CONTENT_TYPE, header::AUTHORIZATION, header::ACCEPT, header::IF_NONE_MATCH])
+        .allow_headers(
+            [header::CONTENT_TYPE, header::AUTHORIZATION, header::ACCEPT, header::IF_NONE_MATCH]
+                .into_iter()
+                .chain(["idempotency-key", "x-filename", "last-event-id"].map(HeaderName::from_static))
+                .collect::<Vec<_>>(),
+        )
         .expose_headers(Any))
 }
 
-/// Counts requests by route and status. The route's pattern, not its path: a label must not grow with the ids.
+/// Counts requests by route and status. Labels must not grow with what clients make up: the route's pattern, not its path,
+/// and only methods that exist.
 async fn count(path: Option<MatchedPath>, request: Request<axum::body::Body>, next: Next) -> Response {
-    let method = request.method().to_string();
+    let method = match request.method().as_str() {
+        known @ ("GET" | "HEAD" | "POST" | "PUT" | "DELETE" | "OPTIONS" | "PATCH") => known.to_owned(),
+        _ => "OTHER".to_owned(),
+    };
     let response = next.run(request).await;
     let route = path.map_or_else(|| "static".to_owned(), |p| p.as_str().to_owned());
     let labels = [("method", method), ("route", route), ("status", response.status().as_u16().to_string())];

@@ -5,7 +5,7 @@ use std::convert::Infallible;
 use std::sync::Arc;
 
 use axum::body::{Body, Bytes};
-use axum::extract::{Path, State};
+use axum::extract::State;
 use axum::http::{HeaderMap, header};
 use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
@@ -16,6 +16,7 @@ use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 
 use super::App;
+use super::problem::Id;
 use super::renders::{CancelOnDrop, find, frame_headers};
 use crate::error::Result;
 use crate::job::{Frame, Job, State as JobState, Update};
@@ -96,7 +97,7 @@ pub(super) fn frames_of(app: &App, job: Arc<Job>, fresh: bool) -> Result<Respons
 }
 
 /// `GET /v1/renders/{id}/frames`.
-pub(super) async fn frames(State(app): State<App>, Path(id): Path<String>) -> Result<Response> {
+pub(super) async fn frames(State(app): State<App>, Id(id): Id) -> Result<Response> {
     frames_of(&app, find(&app, &id)?, false)
 }
 
@@ -123,7 +124,7 @@ fn event(job: &Job, update: &Update) -> Event {
 }
 
 /// `GET /v1/renders/{id}/events`; `Last-Event-ID` says what was seen before.
-pub(super) async fn events(State(app): State<App>, Path(id): Path<String>, headers: HeaderMap) -> Result<Response> {
+pub(super) async fn events(State(app): State<App>, Id(id): Id, headers: HeaderMap) -> Result<Response> {
     let job = find(&app, &id)?;
     let seen = headers.get("last-event-id").and_then(|v| v.to_str().ok()?.parse().ok()).unwrap_or(0);
     let reader = Reader::new(&app, job, seen, None)?;

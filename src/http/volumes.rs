@@ -2,13 +2,14 @@
 
 use axum::Json;
 use axum::body::Body;
-use axum::extract::{Path, Query, State};
+use axum::extract::{Query, State};
 use axum::http::{Request, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use percent_encoding::percent_decode_str;
 use serde_json::{Value, json};
 
-use super::{App, problem};
+use super::App;
+use super::problem::{self, Id};
 use crate::error::{Error, Result};
 use crate::volume::{RawQuery, VolumeInfo, builtin};
 
@@ -55,7 +56,7 @@ pub(super) async fn list(State(app): State<App>) -> Result<Json<Value>> {
 }
 
 /// `GET /v1/volumes/{id}`, an id or the name of a built-in.
-pub(super) async fn show(State(app): State<App>, Path(id): Path<String>) -> Result<Json<VolumeInfo>> {
+pub(super) async fn show(State(app): State<App>, Id(id): Id) -> Result<Json<VolumeInfo>> {
     let info = tokio::task::spawn_blocking(move || {
         if builtin::NAMES.contains(&id.as_str()) {
             app.store.builtin_info(&id, SHOWN_RESOLUTION, 0)
@@ -67,7 +68,7 @@ pub(super) async fn show(State(app): State<App>, Path(id): Path<String>) -> Resu
 }
 
 /// `DELETE /v1/volumes/{id}`. Renders that use it go on.
-pub(super) async fn delete(State(app): State<App>, Path(id): Path<String>) -> Result<StatusCode> {
+pub(super) async fn delete(State(app): State<App>, Id(id): Id) -> Result<StatusCode> {
     if builtin::NAMES.contains(&id.as_str()) {
         return Err(Error::Conflict("a built-in volume cannot be deleted".into()));
     }

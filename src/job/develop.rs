@@ -14,7 +14,7 @@ pub(super) async fn frames(job: Weak<Job>, engine: Engine) {
     };
     // A snapshot may have come before this task's first turn.
     snapshots.mark_changed();
-    let mut developed_last: Option<Arc<Snapshot>> = None;
+    let mut developed_last: Weak<Snapshot> = Weak::new();
     loop {
         tokio::select! {
             changed = snapshots.changed() => if changed.is_err() { return },
@@ -26,10 +26,10 @@ pub(super) async fn frames(job: Weak<Job>, engine: Engine) {
             return;
         }
         let Some(snapshot) = snapshots.borrow_and_update().clone() else { continue };
-        if developed_last.as_ref().is_some_and(|last| Arc::ptr_eq(last, &snapshot)) {
+        if Weak::ptr_eq(&developed_last, &Arc::downgrade(&snapshot)) {
             continue;
         }
-        developed_last = Some(snapshot.clone());
+        developed_last = Arc::downgrade(&snapshot);
         let developed = tokio::task::spawn_blocking({
             let snapshot = snapshot.clone();
             move || {

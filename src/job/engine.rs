@@ -195,6 +195,14 @@ impl Engine {
             .increment(1);
         let mut jobs = self.jobs();
         jobs.ended.push_back(job.id().to_owned());
+        let kept: Vec<Arc<Job>> = jobs.ended.iter().rev().filter_map(|id| jobs.by_id.get(id).cloned()).collect();
+        let mut films = 0;
+        for older in kept {
+            films += older.film_bytes();
+            if films > self.inner.limits.keep_film_bytes {
+                older.drop_film();
+            }
+        }
         let mut bytes: usize = jobs.ended.iter().filter_map(|id| jobs.by_id.get(id)).map(|j| j.bytes()).sum();
         while jobs.ended.len() > 1
             && (jobs.ended.len() > self.inner.limits.keep_renders || bytes > self.inner.limits.keep_bytes)

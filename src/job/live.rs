@@ -326,7 +326,7 @@ impl Live {
         let film = Film { field_error: self.field_error, ..view.film(context)? };
         let device_time = view.device_time + self.field.as_ref().map_or(Duration::ZERO, |f| f.device_time);
         let snapshot = Snapshot {
-            film,
+            film: Arc::new(film),
             generation: self.generation,
             elapsed_ms: self.asked.elapsed().as_secs_f64() * 1e3,
             device_ms: device_time.as_secs_f64() * 1e3,

@@ -32,7 +32,7 @@ const TRACE_POINTS: usize = 512;
 
 /// What the device thread hands to the developer of a job's frames.
 pub(crate) struct Snapshot {
-    pub film: Film,
+    pub film: Arc<Film>,
     pub generation: u64,
     pub elapsed_ms: f64,
     pub device_ms: f64,
@@ -254,7 +254,7 @@ impl Job {
         progress.sequence += 1;
         progress.samples = snapshot.film.main.count;
         progress.error = Some(error);
-        progress.film = Some(Arc::new(snapshot.film.clone()));
+        progress.film = Some(snapshot.film.clone());
         progress.counts.clipped_values = clipped;
         progress.counts.non_finite_samples = snapshot.non_finite_samples;
         progress.stopped_by = snapshot.stopped_by.filter(|_| ends);
@@ -295,6 +295,17 @@ impl Job {
         });
         self.updates.send_replace(Update { state: progress.state, frame: Some(frame) });
         ends
+    }
+
+    /// Lets go of the film; the PNG stays.
+    pub(crate) fn drop_film(&self) {
+        self.lock().film = None;
+        self.snapshots.send_replace(None);
+    }
+
+    /// Bytes of the film, which costs ten times the PNG.
+    pub(crate) fn film_bytes(&self) -> usize {
+        self.lock().film.as_ref().map_or(0, |f| f.bytes())
     }
 
     /// Bytes held for readers.

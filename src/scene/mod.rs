@@ -117,7 +117,7 @@ impl Scene {
         };
         let empty = Value::Object(Default::default());
         let view = parse(request.parameters.get(technique.name).unwrap_or(&empty), &format!("/{}", technique.name))?;
-        let (subject, framing) = subject(request.volume.as_ref(), store)?;
+        let (subject, framing) = subject(request.volume.as_ref(), store, limits)?;
         let camera = Camera::from_request(request.camera.as_ref(), &framing)?;
         let image = request.image.unwrap_or_default();
         let image = [image.width.unwrap_or(DEFAULT_SIDE), image.height.unwrap_or(DEFAULT_SIDE)];
@@ -180,7 +180,7 @@ fn budget(request: &BudgetRequest, limits: &Limits) -> Budget {
     Budget { samples: request.samples.unwrap_or(default), time_ms: request.time_ms, max_error: request.max_error }
 }
 
-fn subject(request: Option<&VolumeRequest>, store: &Store) -> Result<(Subject, Framing)> {
+fn subject(request: Option<&VolumeRequest>, store: &Store, limits: &Limits) -> Result<(Subject, Framing)> {
     let Some(request) = request else { return built_in("smoke", None, None, store) };
     let given = usize::from(request.id.is_some()) + usize::from(request.builtin.is_some()) + request.field.len();
     if given != 1 {
@@ -211,12 +211,23 @@ fn subject(request: Option<&VolumeRequest>, store: &Store) -> Result<(Subject, F
         return built_in(name, request.resolution, request.seed, store);
     }
     let (name, parameters) = request.field.iter().next().ok_or_else(|| Error::internal("a field without a name"))?;
-    let Some(technique::Kind::Field(parse)) = technique::find(name).map(|t| t.kind) else {
-        return Err(Error::internal("the schema permits a field that is not in the list"));
-    };
-    let field = parse(parameters, &format!("/volume/{name}"))?;
+    let found = technique::find(name)
+        .and_then(|t| if let technique::Kind::Field(parse) = t.kind { Some((t, parse)) } else { None });
+    let (technique, parse) =
+        found.ok_or_else(|| Error::internal("the schema permits a field that is not in the list"))?;
+    let field = parse(&within_limits(technique, parameters, limits), &format!("/volume/{name}"))?;
     let framing = field.framing();
     Ok((Subject::Field(field), framing))
+}
+
+/// The parameters with a default number of photons that the limits permit.
+fn within_limits(technique: &Technique, parameters: &Value, limits: &Limits) -> Value {
+    let mut parameters = parameters.clone();
+    let default = (technique.schema)().pointer("/properties/photons/default").and_then(Value::as_u64);
+    if let (Some(fields), Some(default)) = (parameters.as_object_mut(), default) {
+        fields.entry("photons").or_insert(default.min(limits.max_photons).into());
+    }
+    parameters
 }
 
 fn built_in(name: &str, resolution: Option<u32>, seed: Option<u64>, store: &Store) -> Result<(Subject, Framing)> {

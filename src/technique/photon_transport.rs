@@ -126,7 +126,7 @@ pub struct Parameters {
     /// Ends faint photons without bias.
     roulette: Roulette,
     /// Keys every random number of the simulation.
-    #[schemars(range(min = 0))]
+    #[schemars(range(min = 0, max = 9_007_199_254_740_991u64))]
     seed: u64,
 }
 
