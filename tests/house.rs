@@ -103,6 +103,31 @@ fn no_file_grows_past_its_job() {
     }
 }
 
+/// The numbers and colours of a table `name = [ … ];` in a source text, in order.
+fn table(text: &str, name: &str) -> Vec<String> {
+    let start = text.find(&format!("const {name}")).unwrap_or_else(|| panic!("no table {name}"));
+    let body = &text[start..];
+    let body = &body[body.find('=').unwrap()..body.find("];").unwrap()];
+    let words =
+        body.split(|c: char| !(c.is_ascii_alphanumeric() || "#.-".contains(c))).filter(|w| !w.is_empty() && *w != "-");
+    words
+        .map(|w| match w.trim_start_matches("0x").trim_start_matches('#') {
+            colour if colour.len() == 6 && w != colour => colour.to_owned(),
+            number => number.parse::<f64>().unwrap_or_else(|_| panic!("{name}: {w}")).to_string(),
+        })
+        .collect()
+}
+
+#[test]
+fn the_viewers_presets_are_the_servers() {
+    let read = |file: &str| std::fs::read_to_string(root().join(file)).unwrap();
+    let (server, viewer) = (read("src/scene/transfer.rs"), read("static/presets.js"));
+    for name in ["RAMP", "MRI_HEAD", "CT_BONE", "CT_BONE_HOUNSFIELD"] {
+        let (ours, theirs) = (table(&server, name), table(&viewer, name));
+        assert!(ours.len() >= 9 && ours == theirs, "{name}: {ours:?} in the server, {theirs:?} in the viewer");
+    }
+}
+
 /// The `sh` blocks of the README that call curl.
 fn curl_examples() -> Vec<String> {
     let readme = std::fs::read_to_string(root().join("README.md")).unwrap();

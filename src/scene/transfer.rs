@@ -81,11 +81,11 @@ const RAMP: PresetPoints = &[(0.0, 0x1a1a80, 0.0), (0.5, 0xe08040, 0.5), (1.0, 0
 const MRI_HEAD: PresetPoints = &[
     (0.0, 0x000000, 0.0),
     (0.13, 0x5a2e22, 0.0),
-    (0.22, 0xb0694a, 0.10),
-    (0.34, 0xc98f70, 0.16),
-    (0.50, 0xd8b49a, 0.40),
-    (0.65, 0xf0dcc8, 1.0),
-    (1.0, 0xffffff, 2.0),
+    (0.22, 0xb0694a, 0.4),
+    (0.34, 0xc98f70, 0.64),
+    (0.50, 0xd8b49a, 1.6),
+    (0.65, 0xf0dcc8, 4.0),
+    (1.0, 0xffffff, 8.0),
 ];
 /// Bone of a CT whose values are not Hounsfield units.
 const CT_BONE: PresetPoints = &[
