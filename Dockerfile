@@ -36,7 +36,7 @@ USER 10001
 # `docker stop` kills after 10 s: running renders get less than that to end.
 ENV CLOUDCHAMBER_LISTEN=0.0.0.0:8080 \
     CLOUDCHAMBER_DATA_DIR=/tmp/cloudchamber \
-    CLOUDCHAMBER_DRAIN_MS=8000
+    CLOUDCHAMBER_DRAIN_MS=6000
 EXPOSE 8080
 STOPSIGNAL SIGTERM
 HEALTHCHECK --interval=30s --timeout=6s --start-period=10s CMD ["cloudchamber", "healthcheck"]

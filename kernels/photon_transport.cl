@@ -5,7 +5,6 @@
 // Sums are 64-bit integers in units of 2^-30, so that they do not depend on the order of addition.
 
 #define FIXED_ONE 1073741824.0f
-#define PHOTONS_PER_LANE 32
 
 #define LEDGER_EXIT 0
 #define LEDGER_ABSORBED 6
@@ -15,7 +14,7 @@
 #define LEDGER_PATH 10
 
 // A photon that takes more steps than this through voxels has met a fault of arithmetic and is counted as lost.
-#define MOST_STEPS 1000000
+#define MOST_STEPS 100000
 
 static inline void tally(global ulong *sums, Int cell, Real amount, Mask active) {
     IntLanes to, on;
@@ -105,8 +104,8 @@ static inline Mask collide(constant const FieldPass *pass, constant const Photon
 kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport *params, global const float *extinction_per_mm,
                              global ulong *grid, global ulong *ledger) {
     uint item = (uint)get_global_id(0);
-    if ((ulong)item * (uint)(LANES * PHOTONS_PER_LANE) >= pass->count) return;
-    UInt lane_first = item * (uint)(LANES * PHOTONS_PER_LANE) + as_UInt(LANE_IDS) * (uint)PHOTONS_PER_LANE;
+    if ((ulong)item * (LANES * pass->per_lane) >= pass->count) return;
+    UInt lane_first = item * (LANES * pass->per_lane) + as_UInt((Int)(LANE_IDS)) * pass->per_lane;
     int nx = params->grid[0], ny = params->grid[1], nz = params->grid[2];
 
     Photon photon;
@@ -115,7 +114,7 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
     photon.weight = photon.depth = (Real)(0.0f);
     photon.number = photon.event = (UInt)(0u);
     // The last item of a launch may have fewer photons than lanes: never one too many.
-    Int share = as_Int(min((UInt)(pass->count) - min(lane_first, (UInt)(pass->count)), (UInt)(PHOTONS_PER_LANE)));
+    Int share = as_Int(min((UInt)(pass->count) - min(lane_first, (UInt)(pass->count)), (UInt)(pass->per_lane)));
     Int left = share, steps = (Int)(0);
     Mask alive = (Mask)(0);
     UInt scatterings = (UInt)(0u);

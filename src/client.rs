@@ -82,11 +82,16 @@ impl Client {
         reply["id"].as_str().map(str::to_owned).ok_or_else(|| Error::internal("the server gave no id"))
     }
 
-    /// Posts a render and follows it to its end; returns the PNG of the last frame and the render resource.
+    /// Posts a render and follows it to its end; returns the last frame as PNG, or `exr`, and the render resource.
     ///
     /// # Errors
     /// The server's refusal in its words, or how the render ended otherwise.
-    pub async fn render(&self, scene: &Value, mut progress: impl FnMut(&Progress)) -> Result<(Vec<u8>, Value)> {
+    pub async fn render(
+        &self,
+        scene: &Value,
+        exr: bool,
+        mut progress: impl FnMut(&Progress),
+    ) -> Result<(Vec<u8>, Value)> {
         let body = scene.to_string().into_bytes();
         let reply = self.send(reqwest::Method::POST, "/v1/renders", Some(body.into()), "application/json").await?;
         let reply: Value = reply.json().await.map_err(Error::internal)?;
@@ -99,8 +104,9 @@ impl Client {
         if resource["state"] != "done" {
             return Err(Error::Conflict(format!("the render is {}: {}", resource["state"], resource["failure"])));
         }
-        let png = self.send(reqwest::Method::GET, &format!("{path}/frame.png"), None, "").await?;
-        Ok((png.bytes().await.map_err(Error::internal)?.to_vec(), resource))
+        let name = if exr { "frame.exr" } else { "frame.png" };
+        let picture = self.send(reqwest::Method::GET, &format!("{path}/{name}"), None, "").await?;
+        Ok((picture.bytes().await.map_err(Error::internal)?.to_vec(), resource))
     }
 
     /// Reads server-sent events until the stream ends.
@@ -132,7 +138,7 @@ async fn refusal(response: reqwest::Response) -> Error {
     Error::Malformed(format!("the server answered {status}: {detail}"))
 }
 
-/// Asks `/readyz` once.
+/// Asks `/healthz` once, past any proxy.
 ///
 /// # Errors
 /// [`Error::Unavailable`] with the reason.

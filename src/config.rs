@@ -9,6 +9,9 @@ use clap::Args;
 use crate::device::DeviceConfig;
 use crate::volume::{StoreLimits, VolumeLimits};
 
+/// Kernels address voxels by 32-bit byte offsets.
+const LARGEST_VOLUME: u64 = (1 << 31) - 16;
+
 /// Where things are kept and which device is used: shared by `serve`, `render` and `device`.
 #[derive(Debug, Clone, Args)]
 pub struct DeviceArgs {
@@ -52,7 +55,7 @@ impl DeviceArgs {
 #[derive(Debug, Clone, Args)]
 pub struct Limits {
     /// Largest image side in pixels
-    #[arg(long, env = "CLOUDCHAMBER_MAX_IMAGE_SIDE", default_value_t = 4096)]
+    #[arg(long, env = "CLOUDCHAMBER_MAX_IMAGE_SIDE", default_value_t = 4096, value_parser = clap::value_parser!(u32).range(1..=16_384))]
     pub max_image_side: u32,
     /// Most samples per pixel
     #[arg(long, env = "CLOUDCHAMBER_MAX_SAMPLES", default_value_t = 65_536)]
@@ -64,7 +67,7 @@ pub struct Limits {
     #[arg(long, env = "CLOUDCHAMBER_MAX_PHOTONS", default_value_t = 1_000_000_000)]
     pub max_photons: u64,
     /// Largest volume in bytes of voxels, after unpacking
-    #[arg(long, env = "CLOUDCHAMBER_MAX_VOLUME_BYTES", default_value_t = 1 << 30)]
+    #[arg(long, env = "CLOUDCHAMBER_MAX_VOLUME_BYTES", default_value_t = 1 << 30, value_parser = clap::value_parser!(u64).range(1..=LARGEST_VOLUME))]
     pub max_volume_bytes: u64,
     /// Most bytes of uploaded files kept on disk
     #[arg(long, env = "CLOUDCHAMBER_MAX_STORE_BYTES", default_value_t = 20 << 30)]

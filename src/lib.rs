@@ -5,7 +5,9 @@
 //!            (wire JSON) (valid)  (data)  (queue) (OpenCL)  (sums)         (PNG)
 //! ```
 //!
-//! One direction, no way back: a module may use what stands to its right, never what stands to its left.
+//! The data goes one way. Who uses whom: `http` and the command line → `job` → `scene` and `technique` → `device` → `film` →
+//! `frame` → `volume` → `error`; never back (`tests/house.rs` sees to it). A job holds its scene and lets it be planned where it
+//! runs, since a field's plan changes while it fills.
 //!
 //! | module | what it is |
 //! |---|---|

@@ -44,7 +44,7 @@ enum Command {
 struct RenderArgs {
     /// The scene, or - for standard input
     scene: PathBuf,
-    /// Where the PNG goes (an .exr name gives linear floats; local renders only)
+    /// Where the PNG goes; a name that ends in .exr gets OpenEXR in linear floats
     #[arg(short, long, default_value = "out.png")]
     output: PathBuf,
     /// Volume file to look at, in place of the scene's volume
@@ -60,6 +60,12 @@ struct RenderArgs {
     device: DeviceArgs,
     #[command(flatten)]
     limits: Limits,
+}
+
+impl RenderArgs {
+    fn wants_exr(&self) -> bool {
+        self.output.extension().is_some_and(|e| e == "exr")
+    }
 }
 
 fn main() -> ExitCode {
@@ -165,7 +171,7 @@ async fn render_there(args: &RenderArgs, server: &str, scene: &mut Value) -> Res
     }
     let bar = bar(scene);
     let done = client
-        .render(scene, |p| {
+        .render(scene, args.wants_exr(), |p| {
             bar.set_position(p.samples);
             bar.set_message(p.error.map_or(String::new(), |e| format!("error {:.3} %", 100.0 * e)));
         })
@@ -185,7 +191,7 @@ async fn render_here(args: &RenderArgs, scene: &mut Value) -> Result<(Vec<u8>, V
     let valid = Scene::from_json(scene, &store, &args.limits)?;
     let engine = Engine::start(args.device.device_config(), args.limits.clone())?;
     engine.ready().await?;
-    let job = engine.submit(scene.clone(), valid)?;
+    let job = engine.submit(engine.reserve()?, scene.clone(), valid);
     let bar = bar(scene);
     let mut updates = job.watch();
     loop {
@@ -197,11 +203,9 @@ async fn render_here(args: &RenderArgs, scene: &mut Value) -> Result<(Vec<u8>, V
         match (update.state, update.frame) {
             (State::Done, Some(last)) => {
                 bar.finish();
-                let exr = args.output.extension().is_some_and(|e| e == "exr");
-                let bytes = match job.film() {
-                    Some((film, error)) if exr => film.exr(&error)?,
-                    _ => last.png.to_vec(),
-                };
+                let exr = args.wants_exr();
+                let film = || job.film().ok_or_else(|| Error::internal("the film is gone"));
+                let bytes = if exr { film().and_then(|(film, error)| film.exr(&error))? } else { last.png.to_vec() };
                 return Ok((bytes, job.resource()));
             }
             (State::Failed | State::Cancelled, _) => {

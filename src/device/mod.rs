@@ -66,6 +66,37 @@ fn cl<T>(doing: &str, result: std::result::Result<T, opencl3::error_codes::ClErr
     result.map_err(|e| Error::internal(format!("OpenCL, {doing}: {e}")))
 }
 
+/// The formats of read-only 3D images, by OpenCL's names for the ones in use here and by number for the rest.
+fn image_formats(context: &Context) -> Vec<String> {
+    use opencl3::memory as m;
+    let order = |o| match o {
+        m::CL_R => "R".into(),
+        m::CL_RG => "RG".into(),
+        m::CL_RGBA => "RGBA".into(),
+        m::CL_INTENSITY => "INTENSITY".into(),
+        m::CL_LUMINANCE => "LUMINANCE".into(),
+        other => format!("{other:#x}"),
+    };
+    let kind = |t| match t {
+        m::CL_UNORM_INT8 => "UNORM_INT8".into(),
+        m::CL_UNORM_INT16 => "UNORM_INT16".into(),
+        m::CL_SNORM_INT16 => "SNORM_INT16".into(),
+        m::CL_UNSIGNED_INT8 => "UNSIGNED_INT8".into(),
+        m::CL_UNSIGNED_INT16 => "UNSIGNED_INT16".into(),
+        m::CL_SIGNED_INT16 => "SIGNED_INT16".into(),
+        m::CL_HALF_FLOAT => "HALF_FLOAT".into(),
+        m::CL_FLOAT => "FLOAT".into(),
+        other => format!("{other:#x}"),
+    };
+    let formats =
+        context.get_supported_image_formats(m::CL_MEM_READ_ONLY, m::CL_MEM_OBJECT_IMAGE3D).unwrap_or_default();
+    let name = |f: &opencl3::types::cl_image_format| -> String {
+        let (order, kind): (String, String) = (order(f.image_channel_order), kind(f.image_channel_data_type));
+        format!("{order}/{kind}")
+    };
+    formats.iter().map(name).collect()
+}
+
 /// Points PoCL's compiled-kernel cache at `cache`, unless the environment names one already, and makes sure that code can be
 /// run from there: PoCL itself would crash later.
 /// Call before any thread is started and before OpenCL is first used.
@@ -98,10 +129,11 @@ impl Device {
     /// # Errors
     /// [`Error::Internal`] when there is none or OpenCL fails.
     pub fn open(config: &DeviceConfig) -> Result<Self> {
-        let (device, info) = select(&config.wish, config.lanes)?;
+        let (device, mut info) = select(&config.wish, config.lanes)?;
         let context = cl("creating the context", Context::from_device(&device))?;
         // The 1.x form: PoCL 3.1 and NVIDIA's OpenCL both have it.
         let queue = cl("creating the queue", CommandQueue::create_default(&context, 0))?;
+        info.image_formats_3d = image_formats(&context);
         Ok(Self { info, id: device.id(), context, queue, kernels: HashMap::new(), overrides: config.kernels.clone() })
     }
 

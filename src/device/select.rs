@@ -37,6 +37,8 @@ pub struct DeviceInfo {
     pub native_vector_width_float: u32,
     /// Whether images (textures) are supported.
     pub image_support: bool,
+    /// Formats of 3D images, as `order/type` in OpenCL's names; known once the device is opened.
+    pub image_formats_3d: Vec<String>,
     /// The largest 3D image, voxels a side.
     pub largest_image_3d: [usize; 3],
     /// Whether 64-bit integer atomics are there (photon transport needs them).
@@ -91,6 +93,7 @@ fn describe(platform: &Platform, device: &ClDevice, forced_lanes: Option<u32>) -
         } else {
             [0; 3]
         },
+        image_formats_3d: Vec::new(),
         int64_atomics: cl(device.extensions())?.contains("cl_khr_int64_base_atomics"),
         lanes,
         // A CPU work-item is already a packet, so a group is only the unit that threads share out; a GPU wants whole warps.

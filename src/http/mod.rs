@@ -26,6 +26,8 @@ use crate::error::{Error, Result};
 use crate::job::Engine;
 use crate::volume::Store;
 
+/// Uploads at the same time: each may be as large as the limit of a body.
+const UPLOADS: usize = 4;
 /// Idempotency keys that are remembered.
 const IDEMPOTENCY_KEYS: usize = 4096;
 /// After draining, connections that still will not end get this long.
@@ -39,6 +41,8 @@ pub(crate) struct App {
     limits: Arc<Limits>,
     request_timeout: Duration,
     streams: Arc<Semaphore>,
+    /// Uploads that are held in memory at the same time; the others wait unread.
+    uploads: Arc<Semaphore>,
     /// Ends every stream when the server stops.
     stop: CancellationToken,
     idempotency: Arc<Mutex<Idempotency>>,
@@ -97,6 +101,7 @@ impl Server {
             limits: Arc::new(config.limits.clone()),
             request_timeout: Duration::from_millis(config.request_timeout_ms),
             streams: Arc::new(Semaphore::new(config.limits.max_streams)),
+            uploads: Arc::new(Semaphore::new(UPLOADS)),
             stop: stop.clone(),
             idempotency: Arc::default(),
             static_dir: config.static_dir.clone(),

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use axum::body::{Body, Bytes};
+use axum::body::Body;
 use axum::extract::{FromRequestParts, Path};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderValue, Request, StatusCode, header};
@@ -78,7 +78,7 @@ pub fn from_panic(panic: Box<dyn std::any::Any + Send>) -> Response {
 ///
 /// # Errors
 /// [`Error::TooLarge`], [`Error::RequestTimeout`], or [`Error::Malformed`] when it breaks off.
-pub async fn read_body(headers: &HeaderMap, body: Body, limit: usize, patience: Duration) -> Result<Bytes> {
+pub async fn read_body(headers: &HeaderMap, body: Body, limit: usize, patience: Duration) -> Result<Vec<u8>> {
     let too_large = || Error::TooLarge { what: "the body".into(), limit: format!("{limit} bytes") };
     let announced = headers.get(header::CONTENT_LENGTH).and_then(|v| v.to_str().ok()?.parse::<u64>().ok());
     if announced.is_some_and(|n| n > limit as u64) {
@@ -90,7 +90,7 @@ pub async fn read_body(headers: &HeaderMap, body: Body, limit: usize, patience: 
     loop {
         match tokio::time::timeout(patience, stream.next()).await {
             Err(_) => return Err(Error::RequestTimeout),
-            Ok(None) => return Ok(bytes.into()),
+            Ok(None) => return Ok(bytes),
             Ok(Some(Err(cause))) => return Err(Error::Malformed(format!("the body broke off: {cause}"))),
             Ok(Some(Ok(piece))) if bytes.len() + piece.len() > limit => return Err(too_large()),
             Ok(Some(Ok(piece))) => bytes.extend_from_slice(&piece),

@@ -61,11 +61,8 @@ async fn submit(app: &App, headers: &HeaderMap, body: Value) -> Result<(Arc<Job>
     {
         return Ok((job, false));
     }
-    // A place in the queue is looked for before anything is loaded for the request; the engine's `submit` looks again.
-    if !app.engine.has_room() {
-        let waiting = app.engine.unfinished();
-        return Err(Error::QueueFull { waiting, retry_after_s: 1 + waiting as u64 / 16 });
-    }
+    // A place in the queue before anything is loaded for the request.
+    let place = app.engine.reserve()?;
     // Decoding a volume or making a built-in takes a while: not on the runtime's own threads.
     let scene = tokio::task::spawn_blocking({
         let (app, body) = (app.clone(), body.clone());
@@ -73,11 +70,11 @@ async fn submit(app: &App, headers: &HeaderMap, body: Value) -> Result<(Arc<Job>
     })
     .await
     .map_err(Error::internal)??;
-    let Some(key) = key else { return Ok((app.engine.submit(body, scene)?, true)) };
+    let Some(key) = key else { return Ok((app.engine.submit(place, body, scene), true)) };
     if let Some(job) = remembered(app, &key)? {
         return Ok((job, false));
     }
-    let job = app.engine.submit(body, scene)?;
+    let job = app.engine.submit(place, body, scene);
     let mut known = app.idempotency.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     known.remember(key, hash, job.id().to_owned());
     Ok((job, true))

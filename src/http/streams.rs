@@ -60,18 +60,15 @@ impl Reader {
 
 const OPENING: &[u8] = b"--frame\r\n";
 
-/// A part, and the boundary behind it at once: a browser shows a part when it sees that it is over.
-fn part(frame: &Frame, last: bool) -> Bytes {
-    let mut bytes = Vec::with_capacity(frame.png.len() + 256);
-    bytes.extend_from_slice(b"Content-Type: image/png\r\n");
-    bytes.extend_from_slice(format!("Content-Length: {}\r\n", frame.png.len()).as_bytes());
+/// A part, and the boundary behind it at once: a browser shows a part when it sees that it is over. The picture itself is
+/// shared by all readers, however many do not read.
+fn part(frame: &Frame, last: bool) -> [Bytes; 3] {
+    let mut head = format!("Content-Type: image/png\r\nContent-Length: {}\r\n", frame.png.len());
     for (name, value) in frame_headers(frame) {
-        bytes.extend_from_slice(format!("{name}: {value}\r\n").as_bytes());
+        head += &format!("{name}: {value}\r\n");
     }
-    bytes.extend_from_slice(b"\r\n");
-    bytes.extend_from_slice(&frame.png);
-    bytes.extend_from_slice(if last { b"\r\n--frame--\r\n" } else { b"\r\n--frame\r\n" });
-    bytes.into()
+    let boundary: &[u8] = if last { b"\r\n--frame--\r\n" } else { b"\r\n--frame\r\n" };
+    [(head + "\r\n").into(), frame.png.clone(), Bytes::from_static(boundary)]
 }
 
 fn multipart(reader: Reader) -> impl Stream<Item = std::result::Result<Bytes, Infallible>> {
@@ -81,10 +78,10 @@ fn multipart(reader: Reader) -> impl Stream<Item = std::result::Result<Bytes, In
         // An end without a new frame: the stream just stops.
         let fresh = update.frame.filter(|f| f.sequence > before);
         before = fresh.as_ref().map_or(before, |f| f.sequence);
-        let bytes = fresh.map(|f| Ok(part(&f, update.state.is_terminal())));
-        async move { bytes }
+        let pieces = fresh.map(|f| stream::iter(part(&f, update.state.is_terminal()).map(Ok)));
+        async move { pieces }
     });
-    stream::once(async { Ok(Bytes::from_static(OPENING)) }).chain(parts)
+    stream::once(async { Ok(Bytes::from_static(OPENING)) }).chain(parts.flatten())
 }
 
 /// The frames of a job as a response; a render that `fresh`ly belongs to this request ends with it.

@@ -27,11 +27,11 @@ pub(super) async fn create(State(app): State<App>, request: Request<Body>) -> Re
     let name = parts.headers.get("x-filename").and_then(|v| v.to_str().ok()).unwrap_or("volume");
     let name: String =
         percent_decode_str(name).decode_utf8_lossy().chars().filter(|c| !c.is_control()).take(200).collect();
+    let _turn = app.uploads.acquire().await.map_err(Error::internal)?;
     let bytes = problem::read_body(&parts.headers, body, app.limits.max_body_bytes, app.request_timeout).await?;
     let store = app.store.clone();
-    let (volume, id, new) = tokio::task::spawn_blocking(move || store.insert(bytes.to_vec(), &name, raw))
-        .await
-        .map_err(Error::internal)??;
+    let (volume, id, new) =
+        tokio::task::spawn_blocking(move || store.insert(bytes, &name, raw)).await.map_err(Error::internal)??;
     let location = format!("/v1/volumes/{id}");
     let status = if new { StatusCode::CREATED } else { StatusCode::OK };
     Ok((status, [(header::LOCATION, location)], Json(VolumeInfo::of_upload(&id, &volume))).into_response())

@@ -46,6 +46,20 @@ struct Jobs {
     ended: VecDeque<String>,
 }
 
+/// A place in the queue; given back when dropped unless a render has taken it.
+pub struct Place {
+    engine: Engine,
+    taken: bool,
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        if !self.taken {
+            self.engine.inner.unfinished.fetch_sub(1, Ordering::AcqRel);
+        }
+    }
+}
+
 /// A handle on the engine; clones share it.
 #[derive(Clone)]
 pub struct Engine {
@@ -117,23 +131,32 @@ impl Engine {
         if self.inner.draining.load(Ordering::Acquire) {
             return Err(Error::Unavailable("the server is shutting down".into()));
         }
+        if let Readiness::Failed(_) = self.readiness() {
+            return Err(Error::Unavailable("the device cannot be used; the server's log says why".into()));
+        }
         let limit = self.inner.limits.queue;
         let took =
             self.inner.unfinished.fetch_update(Ordering::AcqRel, Ordering::Acquire, |n| (n < limit).then_some(n + 1));
         took.map(drop).map_err(|waiting| Error::QueueFull { waiting, retry_after_s: 1 + waiting as u64 / 16 })
     }
 
-    /// Admits a render and queues it. `request` is kept to be shown again.
+    /// A place in the queue, to be taken before anything is loaded for a render.
     ///
     /// # Errors
-    /// [`Error::QueueFull`], or [`Error::Unavailable`] while draining.
-    pub fn submit(&self, request: Value, scene: Scene) -> Result<Arc<Job>> {
+    /// [`Error::QueueFull`], or [`Error::Unavailable`] while draining or without a device.
+    pub fn reserve(&self) -> Result<Place> {
         self.admit()?;
+        Ok(Place { engine: self.clone(), taken: false })
+    }
+
+    /// Queues a render. `request` is kept to be shown again.
+    pub fn submit(&self, mut place: Place, request: Value, scene: Scene) -> Arc<Job> {
+        place.taken = true;
         let job = Job::new(request, scene);
         self.jobs().by_id.insert(job.id().to_owned(), job.clone());
         self.inner.runtime.spawn(develop::frames(Arc::downgrade(&job), self.clone()));
         self.run(&job);
-        Ok(job)
+        job
     }
 
     fn run(&self, job: &Arc<Job>) {
@@ -164,8 +187,10 @@ impl Engine {
             (false, true) => release(),
             _ => {}
         }
-        if restart.again {
+        if restart.was_done || restart.again {
             self.jobs().ended.retain(|id| id != job.id());
+        }
+        if restart.again {
             self.run(job);
         }
         Ok(())
@@ -194,8 +219,13 @@ impl Engine {
         metrics::counter!("cloudchamber_renders_ended_total", "state" => format!("{:?}", job.state()).to_lowercase())
             .increment(1);
         let mut jobs = self.jobs();
-        jobs.ended.push_back(job.id().to_owned());
-        let kept: Vec<Arc<Job>> = jobs.ended.iter().rev().filter_map(|id| jobs.by_id.get(id).cloned()).collect();
+        // It may run again by now, or have ended twice.
+        if job.state().is_terminal() && !jobs.ended.iter().any(|id| id == job.id()) {
+            jobs.ended.push_back(job.id().to_owned());
+        }
+        // The newest keeps its film however large, for whoever waits for it.
+        let kept: Vec<Arc<Job>> =
+            jobs.ended.iter().rev().skip(1).filter_map(|id| jobs.by_id.get(id).cloned()).collect();
         let mut films = 0;
         for older in kept {
             films += older.film_bytes();
@@ -242,6 +272,10 @@ fn device_thread(
         Err(error) => {
             tracing::error!(%error, "the device is not usable");
             readiness.send_replace(Readiness::Failed(error.to_string()));
+            // Whoever got in before must not wait for ever.
+            while let Ok(job) = incoming.recv() {
+                job.fail(&error);
+            }
             return;
         }
     };
@@ -257,6 +291,7 @@ fn device_thread(
             }
         }
         waiting.extend(incoming.try_iter());
+        waiting.retain(|job| !job.state().is_terminal());
         while live.len() < most_live {
             let Some(job) = waiting.pop_front() else { break };
             live.push_back(Live::new(job));

@@ -6,6 +6,7 @@ use std::time::Duration;
 use serde_json::Value;
 
 use super::live::DeviceContext;
+use super::pace::Pace;
 use crate::device::Buffer;
 use crate::error::Result;
 use crate::technique::photon_transport::FieldPass;
@@ -28,6 +29,7 @@ pub(super) struct FieldRun {
     ledger_before: Vec<u64>,
     ledgers: Vec<Vec<u64>>,
     done: u64,
+    pace: Pace,
     pub device_time: Duration,
 }
 
@@ -42,6 +44,7 @@ impl FieldRun {
         let ledger = device.upload(&vec![0; 8 * plan.ledger], 0)?;
         let ledger_before = vec![0; plan.ledger];
         let (ledgers, done, device_time) = (Vec::new(), 0, Duration::ZERO);
+        let pace = Pace::new(device.info(), 1.0);
         Ok(Self {
             field: field.clone(),
             plan,
@@ -53,6 +56,7 @@ impl FieldRun {
             ledger_before,
             ledgers,
             done,
+            pace,
             device_time,
         })
     }
@@ -73,32 +77,48 @@ impl FieldRun {
 
     /// Works for about `slice`; `true` when the number of finished batches has reached a power of two.
     pub fn slice(&mut self, context: &mut DeviceContext, slice: Duration) -> Result<bool> {
-        let per_item = u64::from(context.device.info().lanes * self.plan.histories_per_lane);
+        let info = context.device.info();
+        // A lane takes many histories one after the other, once they are known to be quick.
+        let fits = self.pace.items(info, slice, info.lanes as usize) / info.local_size;
+        let per_lane = (fits as u32).clamp(1, self.plan.histories_per_lane);
+        let per_item = u64::from(info.lanes * per_lane);
         let end = self.batch_end(self.ledgers.len());
-        let items = context.items_for(&self.plan.variant, slice, per_item as usize) as u64;
+        let items = self.pace.items(info, slice, per_item as usize) as u64;
         let count = (items * per_item).min(end - self.done);
         let seed = self.field.seed();
         let pass = FieldPass {
             first: [self.done as u32, (self.done >> 32) as u32],
             count: count as u32,
+            per_lane,
             seed: [seed as u32, (seed >> 32) as u32],
         };
         context.device.write(&mut self.pass, 0, bytemuck::bytes_of(&pass))?;
         let items = count.div_ceil(per_item) as usize;
         let arguments = [&self.pass, &self.parameters, &self.table, &self.grid, &self.ledger];
         let took = context.device.run(&self.plan.variant, &arguments, 0, items)?;
-        context.measured(&self.plan.variant, items, per_item as usize, took);
+        self.pace.learn(items, per_item as usize, took);
         self.device_time += took;
         self.done += count;
         if self.done < end {
             return Ok(false);
         }
+        self.close_batch(context)?;
+        Ok(self.is_done() || self.ledgers.len().is_power_of_two())
+    }
+
+    /// Ends the simulation with what there is.
+    pub fn cut(&mut self, context: &DeviceContext) -> Result<()> {
+        self.plan.histories = self.done;
+        self.close_batch(context)
+    }
+
+    fn close_batch(&mut self, context: &DeviceContext) -> Result<()> {
         let mut sums = vec![0u64; self.plan.ledger];
         context.device.read(&self.ledger, 0, &mut sums)?;
         self.ledgers
             .push(sums.iter().zip(&self.ledger_before).map(|(now, before)| now.wrapping_sub(*before)).collect());
         self.ledger_before = sums;
-        Ok(self.is_done() || self.ledgers.len().is_power_of_two())
+        Ok(())
     }
 
     /// The volume and the result so far.

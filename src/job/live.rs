@@ -30,7 +30,7 @@ const IDLE_VOLUME_BYTES: usize = 1 << 30;
 pub(super) struct DeviceContext {
     pub device: Device,
     volumes: HashMap<usize, (Weak<Volume>, Rc<Buffer>)>,
-    /// Rays or histories per millisecond, by kernel variant.
+    /// Rays per millisecond of the last pass, by kernel variant: whether a preview is worth it.
     speed: HashMap<Variant, f64>,
 }
 
@@ -78,19 +78,9 @@ impl DeviceContext {
         });
     }
 
-    /// Work-items, of `width` rays or histories each, that take about `slice`: whole work-groups, so that the next slice starts
-    /// where this one ends. Unknown variants start small.
-    pub fn items_for(&self, variant: &Variant, slice: Duration, width: usize) -> usize {
-        let per_ms = self.speed.get(variant).copied().unwrap_or(50.0);
-        let local = self.device.info().local_size;
-        ((per_ms * slice.as_secs_f64() * 1e3 / width as f64) as usize).div_ceil(local).max(1) * local
-    }
-
-    /// Learns from a launch. A speed rises at most fourfold at a time, so that one lucky launch makes no long slice.
-    pub fn measured(&mut self, variant: &Variant, items: usize, width: usize, took: Duration) {
-        let now = (items * width) as f64 / (took.as_secs_f64() * 1e3).max(1e-3);
-        let speed = self.speed.entry(*variant).or_insert(now);
-        *speed = if now < *speed { now } else { (0.5 * (*speed + now)).min(4.0 * *speed) };
+    /// Notes how many rays a millisecond a variant managed, for `expected_ms`.
+    pub fn measured(&mut self, variant: &Variant, rays: usize, took: Duration) {
+        self.speed.insert(*variant, rays as f64 / (took.as_secs_f64() * 1e3).max(1e-3));
     }
 
     /// Milliseconds that so many rays are likely to take, where the variant has run before.
@@ -187,9 +177,19 @@ impl Live {
         self.last_frame = None;
         self.half = None;
         self.job.started();
+        let complete = self.job.lock().complete_field.clone();
         let Some(scene) = &self.scene else { return Ok(()) };
         match (scene.subject(), &self.volume, &mut self.view) {
-            (_, Some(volume), Some(view)) => view.restart(context, scene, volume),
+            (_, Some(volume), Some(view)) => {
+                // A field that is still filling is looked at from the new camera at once.
+                self.look = self.field.as_ref().is_some_and(|f| !f.is_done());
+                view.restart(context, scene, volume)
+            }
+            // A field that was computed for an earlier camera is looked at again, not computed again.
+            (Subject::Field(_), _, _) if complete.is_some() => match complete {
+                Some(volume) => self.begin_view(context, volume),
+                None => Ok(()),
+            },
             (Subject::Volume(volume), _, _) => self.begin_view(context, volume.clone()),
             (Subject::Field(field), _, _) => {
                 let run = FieldRun::new(context, field)?;
@@ -209,7 +209,12 @@ impl Live {
             progress.reasons.extend_from_slice(&view.plan().reasons);
             progress.counts.non_finite_voxels = volume.non_finite();
             progress.warnings = warnings(&volume);
-            progress.field = self.field.is_some().then(|| volume.clone());
+            if self.field.is_some() {
+                progress.field = Some(volume.clone());
+            }
+            if self.field.as_ref().is_some_and(FieldRun::is_done) {
+                progress.complete_field = Some(volume.clone());
+            }
         }
         self.volume = Some(volume);
         self.view = Some(view);
@@ -218,7 +223,13 @@ impl Live {
 
     fn field_turn(&mut self, context: &mut DeviceContext) -> Result<Turn> {
         let Some(field) = &mut self.field else { return Ok(Turn::Over) };
-        if field.slice(context, SLICE)? {
+        let finished = field.slice(context, SLICE)?;
+        let time = self.scene.as_ref().and_then(|s| s.budget().time_ms);
+        let over = time.is_some_and(|ms| self.started.elapsed().as_millis() >= u128::from(ms));
+        if over {
+            field.cut(context)?;
+        }
+        if finished || over {
             let (volume, result) = field.finish(context)?;
             self.result = Some(result);
             self.look = true;
@@ -243,7 +254,7 @@ impl Live {
         match self.verdict(context, pass)? {
             Verdict::Refine => {
                 if let Some(view) = &mut self.view {
-                    view.halve_step();
+                    view.halve_step(context.device.info());
                 }
                 Ok(Turn::Again)
             }
@@ -280,7 +291,10 @@ impl Live {
     fn compare_with_half(&mut self, context: &mut DeviceContext) -> Result<()> {
         let Some(view) = &self.view else { return Ok(()) };
         let film = view.film(context)?;
-        self.field_error = self.half.as_ref().and_then(|half| film.difference(half));
+        // From a new camera there is no picture of the half yet: the error seen from the last one stands in for it.
+        if let Some(half) = &self.half {
+            self.field_error = film.difference(half);
+        }
         self.half = Some(film);
         Ok(())
     }

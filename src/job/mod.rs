@@ -1,13 +1,14 @@
 //! Renders as jobs: a bounded queue, fair slices on the device thread, cancellation, and the latest frame.
 //!
 //! A [`Job`] is what the HTTP side and the device thread share. The device thread leaves snapshots of the film; a task of
-//! the async runtime develops the newest of them into a frame ([`develop`]); readers watch the latest frame and never hold
+//! the async runtime develops the newest of them into a frame (`develop.rs`); readers watch the latest frame and never hold
 //! anybody up.
 
 mod develop;
 mod engine;
 mod field_run;
 mod live;
+mod pace;
 mod report;
 mod resource;
 mod view_run;
@@ -24,7 +25,7 @@ use crate::film::{ErrorEstimate, Film};
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 
-pub use engine::{Engine, Readiness};
+pub use engine::{Engine, Place, Readiness};
 pub use report::{Counts, Frame, State, Timings, TracePoint, Update};
 
 /// Points of the convergence trace that are kept; past this, every second one is dropped.
@@ -72,6 +73,8 @@ pub(crate) struct Progress {
     pub result: Option<Value>,
     pub film: Option<Arc<Film>>,
     pub field: Option<Arc<crate::volume::Volume>>,
+    /// The field once all its histories are in it: a new camera looks at it again.
+    pub complete_field: Option<Arc<crate::volume::Volume>>,
     pub sequence: u64,
 }
 
@@ -108,6 +111,7 @@ impl Job {
             result: None,
             film: None,
             field: None,
+            complete_field: None,
             sequence: 0,
         };
         Arc::new(Self {
@@ -137,7 +141,9 @@ impl Job {
     /// # Errors
     /// [`Error::Invalid`] naming the field.
     pub fn camera_from_json(&self, body: &Value) -> Result<Camera> {
-        self.lock().scene.camera_from_json(body)
+        // A copy: checking takes a while, and the device thread wants the lock.
+        let scene = self.lock().scene.clone();
+        scene.camera_from_json(body)
     }
 
     /// Where it stands.
@@ -229,7 +235,11 @@ impl Job {
             progress.state = State::Queued;
         }
         let state = progress.state;
-        self.updates.send_modify(|u| u.state = state);
+        self.updates.send_modify(|u| {
+            u.state = state;
+            // What was final is not any more.
+            u.frame = u.frame.as_ref().map(|f| Arc::new(Frame { is_final: false, ..(**f).clone() }));
+        });
         Ok(Restart { again, was_done })
     }
 
@@ -299,8 +309,11 @@ impl Job {
 
     /// Lets go of the film; the PNG stays.
     pub(crate) fn drop_film(&self) {
-        self.lock().film = None;
-        self.snapshots.send_replace(None);
+        let mut progress = self.lock();
+        if progress.state.is_terminal() {
+            progress.film = None;
+            self.snapshots.send_replace(None);
+        }
     }
 
     /// Bytes of the film, which costs ten times the PNG.

@@ -9,11 +9,12 @@ use std::time::Duration;
 use glam::Vec2;
 
 use super::live::DeviceContext;
-use crate::device::Buffer;
+use super::pace::Pace;
 use crate::device::structs::View as DeviceView;
+use crate::device::{Buffer, DeviceInfo};
 use crate::error::Result;
 use crate::film::{Film, Samples};
-use crate::scene::Scene;
+use crate::scene::{self, Scene};
 use crate::technique::ViewPlan;
 use crate::volume::Volume;
 
@@ -59,6 +60,9 @@ pub(super) struct ViewRun {
     pass: Option<Pass>,
     cursor: usize,
     wants_preview: bool,
+    pace: Pace,
+    /// The longest way through the volume, world units.
+    longest: f64,
     least_step: f32,
     /// Device time since the start, and of the pass under way.
     pub device_time: Duration,
@@ -90,8 +94,11 @@ impl ViewRun {
         let wants_preview = context.expected_ms(&plan.variant, size[0] * size[1]).is_none_or(|ms| ms > QUICK_MS);
         let voxels = context.volume(volume)?;
         let (pass, cursor, device_time, pass_time) = (None, 0, Duration::ZERO, Duration::ZERO);
+        let longest = 2.0 * scene::radius(volume);
         let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
         Ok(Self {
+            pace: Pace::new(context.device.info(), longest / f64::from(plan.step)),
+            longest,
             least_step: (LEAST_STEP_VOXELS * smallest) as f32,
             plan,
             voxels,
@@ -121,6 +128,7 @@ impl ViewRun {
         };
         context.device.write(&mut self.parameters, 0, &scene.view().parameters(volume, scene.camera())?)?;
         context.device.write(&mut self.counts, 0, &[0; 32])?;
+        self.pace = Pace::new(context.device.info(), self.longest / f64::from(self.plan.step));
         for layer in &mut self.layers {
             layer.samples = 0;
         }
@@ -142,8 +150,9 @@ impl ViewRun {
 
     /// Starts over with half the step: what was gathered has the error of the longer one. The passes proper of the longer step
     /// would make a good control, but for their number; a fresh one costs an eighth of a pass.
-    pub fn halve_step(&mut self) {
+    pub fn halve_step(&mut self, info: &DeviceInfo) {
         self.plan.step *= 0.5;
+        self.pace = Pace::new(info, self.longest / f64::from(self.plan.step));
         self.layers.iter_mut().for_each(|layer| layer.samples = 0);
         self.wants_preview = false;
         (self.pass, self.cursor) = (None, 0);
@@ -180,7 +189,7 @@ impl ViewRun {
             _ => (1, 1),
         };
         let tiles = layer.width.div_ceil(tile_w) * layer.height.div_ceil(tile_h);
-        let items = context.items_for(&self.plan.variant, slice, lanes).min(tiles - self.cursor);
+        let items = self.pace.items(context.device.info(), slice, lanes).min(tiles - self.cursor);
         let arguments = [
             &self.view_buffer,
             &self.parameters,
@@ -191,12 +200,15 @@ impl ViewRun {
             &self.counts,
         ];
         let took = context.device.run(&self.plan.variant, &arguments, self.cursor, items)?;
-        context.measured(&self.plan.variant, items, lanes, took);
+        self.pace.learn(items, lanes, took);
         self.device_time += took;
         self.pass_time += took;
         self.cursor += items;
         if self.cursor < tiles {
             return Ok(None);
+        }
+        if pass == Pass::Main {
+            context.measured(&self.plan.variant, self.size[0] * self.size[1], self.pass_time);
         }
         self.layers[index(pass)].samples += 1;
         (self.pass, self.cursor) = (None, 0);

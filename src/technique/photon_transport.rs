@@ -15,7 +15,7 @@
 //! | `grid` | voxels | 4–512 | 64, 64, 64 |
 //! | `size_mm` | mm | 10⁻³–10⁶ | 1, 1, 1 |
 //! | `albedo` | | 0–1 | 0.9 |
-//! | `extinction_scale` | | 0–10⁴ | 1 |
+//! | `extinction_scale` | | 0–1000 | 1 |
 //! | `source` | mm from the box's corner | a point, `isotropic` or a `cone` | above the hole in the lid |
 //! | `tally` | | `fluence`, `absorbed` | `fluence` |
 //! | `estimator` | | `track_length`, `collision` | `track_length` |
@@ -57,6 +57,8 @@ device_struct! {
         pub first: [u32; 2],
         /// Histories in this launch.
         pub count: u32,
+        /// Histories that a lane takes one after the other.
+        pub per_lane: u32,
         /// The seed, low and high word.
         pub seed: [u32; 2],
     }
@@ -88,7 +90,7 @@ device_struct! {
 
 /// `FIXED_ONE` of the kernel: sums are in units of 2^-30.
 const FIXED_ONE: f64 = 1_073_741_824.0;
-/// `PHOTONS_PER_LANE` of the kernel.
+/// Photons that a lane takes one after the other, at most: enough that lanes which end early are refilled.
 const PHOTONS_PER_LANE: u32 = 32;
 /// Entries of the kernel's ledger, in its order.
 const LEDGER: usize = 11;
@@ -113,7 +115,7 @@ pub struct Parameters {
     #[schemars(range(min = 0, max = 1))]
     albedo: f64,
     /// Multiplies every density.
-    #[schemars(range(min = 0, max = 10_000))]
+    #[schemars(range(min = 0, max = 1000))]
     extinction_scale: f64,
     /// The light.
     source: LightSource,

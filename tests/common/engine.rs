@@ -51,7 +51,7 @@ impl House {
     /// Runs a request to its end.
     pub fn finish(&self, request: &Value) -> Arc<Job> {
         let scene = Scene::from_json(request, &self.store, &self.limits).unwrap_or_else(|e| panic!("{request}: {e}"));
-        let job = self.engine.submit(request.clone(), scene).unwrap();
+        let job = self.engine.submit(self.engine.reserve().unwrap(), request.clone(), scene);
         let mut updates = job.watch();
         self.runtime.block_on(updates.wait_for(|u| u.state.is_terminal())).unwrap();
         assert_eq!(job.state(), State::Done, "{}", job.resource());

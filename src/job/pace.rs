@@ -1,0 +1,43 @@
+//! How much work fits in a slice: learnt per run, since the same kernel is fast on one scene and slow on another.
+
+use std::time::Duration;
+
+use crate::device::DeviceInfo;
+
+/// Rays or histories per millisecond that any device here manages: where a run starts.
+const START_PER_MS: f64 = 50.0;
+/// Samples along rays per millisecond and compute unit that a slow kernel manages: bounds a slice by its longest rays.
+const SAMPLES_PER_MS_PER_UNIT: f64 = 5e4;
+/// A slice takes at most about this, should every ray in it be as long as the longest.
+const WORST_MS: f64 = 100.0;
+
+/// The speed of one run.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pace {
+    per_ms: f64,
+    slowest: f64,
+    most: usize,
+}
+
+impl Pace {
+    /// A run whose rays have at most `steps` steps each (1 where there are none).
+    pub fn new(info: &DeviceInfo, steps: f64) -> Self {
+        let most = WORST_MS * SAMPLES_PER_MS_PER_UNIT * f64::from(info.compute_units) / steps.max(1.0);
+        Self { per_ms: START_PER_MS, slowest: f64::INFINITY, most: most as usize }
+    }
+
+    /// Work-items, of `width` rays or histories each, for about `slice`: whole work-groups, so that the next slice starts where
+    /// this one ends.
+    pub fn items(&self, info: &DeviceInfo, slice: Duration, width: usize) -> usize {
+        let wanted = ((self.per_ms * slice.as_secs_f64() * 1e3) as usize).min(self.most);
+        (wanted / width).div_ceil(info.local_size).max(1) * info.local_size
+    }
+
+    /// Learns from a launch. The speed rises at most fourfold at a time and stays within four times the slowest seen: the
+    /// next rows of a picture may be as dense as the densest before.
+    pub fn learn(&mut self, items: usize, width: usize, took: Duration) {
+        let now = (items * width) as f64 / (took.as_secs_f64() * 1e3).max(1e-3);
+        self.slowest = self.slowest.min(now);
+        self.per_ms = now.min(4.0 * self.per_ms).min(4.0 * self.slowest);
+    }
+}
