@@ -33,11 +33,14 @@ impl Pace {
         (wanted / width).div_ceil(info.local_size).max(1) * info.local_size
     }
 
-    /// Learns from a launch. The speed rises at most fourfold at a time and stays within four times the slowest seen: the
-    /// next rows of a picture may be as dense as the densest before.
+    /// Learns from a launch. The speed rises at most fourfold at a time and stays within four times the slowest of late: the
+    /// next rows of a picture may be as dense as the densest before. A slow launch is forgotten by half again each time, since
+    /// it may have been somebody else's doing; one of less than a millisecond tells of launching, not of the work.
     pub fn learn(&mut self, items: usize, width: usize, took: Duration) {
         let now = (items * width) as f64 / (took.as_secs_f64() * 1e3).max(1e-3);
-        self.slowest = self.slowest.min(now);
+        if took >= Duration::from_millis(1) {
+            self.slowest = now.min(1.5 * self.slowest);
+        }
         self.per_ms = now.min(4.0 * self.per_ms).min(4.0 * self.slowest);
     }
 }
