@@ -78,8 +78,10 @@ impl FieldRun {
     /// Works for about `slice`; `true` when the number of finished batches has reached a power of two.
     pub fn slice(&mut self, context: &mut DeviceContext, slice: Duration) -> Result<bool> {
         let info = context.device.info();
-        // A lane takes many histories one after the other, once they are known to be quick.
-        let fits = self.pace.items(info, slice, info.lanes as usize) / info.local_size;
+        // A lane takes several histories one after the other, so that lanes which end early are refilled; but every core gets at
+        // least two work-groups of a slice.
+        let groups = 2 * info.compute_units as usize;
+        let fits = self.pace.items(info, slice, info.lanes as usize) / (info.local_size * groups);
         let per_lane = (fits as u32).clamp(1, self.plan.histories_per_lane);
         let per_item = u64::from(info.lanes * per_lane);
         let end = self.batch_end(self.ledgers.len());

@@ -21,6 +21,8 @@ use crate::volume::Volume;
 
 /// A turn on the device: long enough to be worth a launch, short enough that nobody waits and a cancel is felt at once.
 const SLICE: Duration = Duration::from_millis(20);
+/// A turn of a field: its packets end at very different times, and a longer slice wastes fewer lanes on the last of them.
+const FIELD_SLICE: Duration = Duration::from_millis(40);
 /// Frames are not made faster than the eye sees: encoding takes cores that the device wants.
 const FRAME_EVERY: Duration = Duration::from_millis(30);
 /// Device memory for volumes that no job uses just now.
@@ -223,7 +225,7 @@ impl Live {
 
     fn field_turn(&mut self, context: &mut DeviceContext) -> Result<Turn> {
         let Some(field) = &mut self.field else { return Ok(Turn::Over) };
-        let finished = field.slice(context, SLICE)?;
+        let finished = field.slice(context, FIELD_SLICE)?;
         let time = self.scene.as_ref().and_then(|s| s.budget().time_ms);
         let over = time.is_some_and(|ms| self.started.elapsed().as_millis() >= u128::from(ms));
         if over {
