@@ -111,7 +111,7 @@ static inline Radiance march(constant const View *view, constant const EmissionA
 kernel void emission_absorption(constant View *view, constant EmissionAbsorption *params, global const uchar *voxels,
                                 global const uchar *distances, global const float *table, global float *film, global uint *counts) {
     int tiles_wide = (view->width + TILE_W - 1) / TILE_W, tiles = tiles_wide * ((view->height + TILE_H - 1) / TILE_H);
-    int tile = (int)get_global_id(0);
+    int tile = view->first_tile + (int)get_global_id(0);
     if (tile >= tiles) return;
     Int column = (tile % tiles_wide) * TILE_W + LANE_IDS % TILE_W, row = (tile / tiles_wide) * TILE_H + LANE_IDS / TILE_W;
     Mask inside = MASK(column < view->width) & MASK(row < view->height);

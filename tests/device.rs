@@ -35,7 +35,7 @@ fn offsets_on_the_device<T: DeviceStruct>() -> Vec<usize> {
     device.build(&source, &variant).unwrap();
     let mut out = vec![-1i32; T::offsets().len() + 1];
     let buffer = device.upload(bytemuck::cast_slice(&out), 0).unwrap();
-    device.run(&variant, &[&buffer], 0, 1).unwrap();
+    device.run(&variant, &[&buffer], 1).unwrap();
     device.read(&buffer, 0, &mut out).unwrap();
     out.into_iter().map(|v| usize::try_from(v).unwrap()).collect()
 }

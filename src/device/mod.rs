@@ -217,14 +217,14 @@ impl Device {
         cl("reading a buffer", event).map(drop)
     }
 
-    /// Runs `items` work-items of a built variant from number `first` on, waits, and says how long the device took.
-    /// `first` is a multiple of the work-group, or two launches would share items: the count is rounded up to whole groups.
+    /// Runs `items` work-items of a built variant, waits, and says how long the device took. No global offset: PoCL compiles
+    /// a kernel anew for one, at its first launch. The count is rounded up to whole work-groups.
     /// `arguments` are the kernel's buffers in order; the kernel itself keeps within them and returns at once for items past
     /// its work.
     ///
     /// # Errors
     /// [`Error::Internal`] when the variant is not built or OpenCL fails.
-    pub fn run(&self, variant: &Variant, arguments: &[&Buffer], first: usize, items: usize) -> Result<Duration> {
+    pub fn run(&self, variant: &Variant, arguments: &[&Buffer], items: usize) -> Result<Duration> {
         let kernel =
             self.kernels.get(variant).ok_or_else(|| Error::internal(format!("{} is not built", variant.label())))?;
         for (index, buffer) in arguments.iter().enumerate() {
@@ -233,14 +233,12 @@ impl Device {
             cl("setting an argument", unsafe { kernel.set_arg(index as u32, &memory) })?;
         }
         let local = self.info.local_size;
-        if !first.is_multiple_of(local) {
-            return Err(Error::internal("a launch that starts within a work-group"));
-        }
-        let (offset, global) = ([first], [items.div_ceil(local) * local]);
+        let global = [items.div_ceil(local) * local];
         let started = Instant::now();
-        // SAFETY: the pointers are to arrays of one element for one work dimension, alive through the call; the arguments are set.
+        // SAFETY: the sizes are arrays of one element for one work dimension, alive through the call; no offset is given; the
+        // arguments are set.
         let event = unsafe {
-            self.queue.enqueue_nd_range_kernel(kernel.get(), 1, offset.as_ptr(), global.as_ptr(), [local].as_ptr(), &[])
+            self.queue.enqueue_nd_range_kernel(kernel.get(), 1, ptr::null(), global.as_ptr(), [local].as_ptr(), &[])
         };
         cl("launching a kernel", event)?;
         cl("waiting for the device", self.queue.finish())?;

@@ -90,6 +90,8 @@ device_struct! {
         pub full_width: i32,
         /// This pass renders every `stride`-th pixel of the full image.
         pub stride: i32,
+        /// Number of the first tile of this launch.
+        pub first_tile: i32,
         /// Number of the sample in its film, from 0.
         pub sample: i32,
         /// Which film: keeps the random numbers of the films apart.

@@ -97,7 +97,7 @@ impl FieldRun {
         context.device.write(&mut self.pass, 0, bytemuck::bytes_of(&pass))?;
         let items = count.div_ceil(per_item) as usize;
         let arguments = [&self.pass, &self.parameters, &self.table, &self.grid, &self.ledger];
-        let took = context.device.run(&self.plan.variant, &arguments, 0, items)?;
+        let took = context.device.run(&self.plan.variant, &arguments, items)?;
         self.pace.learn(items, per_item as usize, took);
         self.device_time += took;
         self.done += count;

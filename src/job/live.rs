@@ -47,7 +47,7 @@ impl DeviceContext {
                 // Zeroed buffers ask for an image of no pixels or a launch of no histories: compiled, and nothing done.
                 let zero: Vec<Buffer> = (0..7).map(|_| device.upload(&[0; 512], 0)).collect::<Result<_>>()?;
                 let arguments: Vec<&Buffer> = zero.iter().take(source.arguments).collect();
-                device.run(&variant, &arguments, 0, 1)?;
+                device.run(&variant, &arguments, 1)?;
             }
         }
         tracing::info!(ms = started.elapsed().as_millis() as u64, lanes = device.info().lanes, "kernels are warm");

@@ -54,7 +54,9 @@ pub(super) struct ViewRun {
     parameters: Buffer,
     view_buffer: Buffer,
     counts: Buffer,
+    /// The camera and image, and the same with the pass under way.
     view: DeviceView,
+    pass_view: DeviceView,
     size: [usize; 2],
     layers: [Layer; 3],
     pass: Option<Pass>,
@@ -108,6 +110,7 @@ impl ViewRun {
             view_buffer,
             counts,
             view,
+            pass_view: view,
             size,
             layers,
             pass,
@@ -178,7 +181,7 @@ impl ViewRun {
     pub fn slice(&mut self, context: &mut DeviceContext, slice: Duration) -> Result<Option<Pass>> {
         let pass = match self.pass {
             Some(pass) => pass,
-            None => self.begin(context)?,
+            None => self.begin(),
         };
         let layer = &self.layers[index(pass)];
         let lanes = context.device.info().lanes as usize;
@@ -190,6 +193,9 @@ impl ViewRun {
         };
         let tiles = layer.width.div_ceil(tile_w) * layer.height.div_ceil(tile_h);
         let items = self.pace.items(context.device.info(), slice, lanes).min(tiles - self.cursor);
+        self.pass_view.first_tile = self.cursor as i32;
+        context.device.write(&mut self.view_buffer, 0, bytemuck::bytes_of(&self.pass_view))?;
+        let layer = &self.layers[index(pass)];
         let arguments = [
             &self.view_buffer,
             &self.parameters,
@@ -199,7 +205,7 @@ impl ViewRun {
             &layer.buffer,
             &self.counts,
         ];
-        let took = context.device.run(&self.plan.variant, &arguments, self.cursor, items)?;
+        let took = context.device.run(&self.plan.variant, &arguments, items)?;
         self.pace.learn(items, lanes, took);
         self.device_time += took;
         self.pass_time += took;
@@ -215,8 +221,8 @@ impl ViewRun {
         Ok(Some(pass))
     }
 
-    /// Chooses the next pass and tells the device of it.
-    fn begin(&mut self, context: &mut DeviceContext) -> Result<Pass> {
+    /// Chooses the next pass.
+    fn begin(&mut self) -> Pass {
         let pass = self.next_pass();
         let layer = &self.layers[index(pass)];
         let offset = pixel_offset(layer.samples);
@@ -230,10 +236,10 @@ impl ViewRun {
             step: if pass == Pass::Main { self.plan.step } else { 2.0 * self.plan.step },
             ..self.view
         };
-        context.device.write(&mut self.view_buffer, 0, bytemuck::bytes_of(&view))?;
+        self.pass_view = view;
         self.pass = Some(pass);
         self.pass_time = Duration::ZERO;
-        Ok(pass)
+        pass
     }
 
     /// Reads what there is to see: the passes proper, or before the first of them the finer of control and preview.
