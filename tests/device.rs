@@ -30,7 +30,14 @@ fn offsets_on_the_device<T: DeviceStruct>() -> Vec<usize> {
     text += &format!("    out[{}] = (int)sizeof({});\n}}\n", T::offsets().len(), T::NAME);
     std::fs::write(folder.path().join("offsets.cl"), text).unwrap();
     let mut device = open(None, Some(folder.path()));
-    let source = Source { kernel: "offsets", headers: &[], structs: T::opencl_text, arguments: 1, variants: Vec::new };
+    let source = Source {
+        kernel: "offsets",
+        headers: &[],
+        structs: T::opencl_text,
+        arguments: 1,
+        variants: Vec::new,
+        common: 0,
+    };
     let variant = Variant { kernel: "offsets", voxel: None, features: &[] };
     device.build(&source, &variant).unwrap();
     let mut out = vec![-1i32; T::offsets().len() + 1];
@@ -79,7 +86,8 @@ fn a_warning_fails_the_build() {
     )
     .unwrap();
     let mut device = open(None, Some(folder.path()));
-    let source = Source { kernel: "sloppy", headers: &[], structs: String::new, arguments: 1, variants: Vec::new };
+    let source =
+        Source { kernel: "sloppy", headers: &[], structs: String::new, arguments: 1, variants: Vec::new, common: 0 };
     let variant = Variant { kernel: "sloppy", voxel: None, features: &[] };
     assert!(device.build(&source, &variant).is_err());
 }

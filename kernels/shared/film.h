@@ -19,3 +19,16 @@ static inline void film_add(global float *film, global uint *counts, int pixel, 
     vstore4(mean, pixel, film);
     film[4 * pixels + pixel] = m2;
 }
+
+// One sample of each of a packet's pixels.
+static inline void film_packet(constant const View *view, global float *film, global uint *counts, Int column, Int row, Real3 colour,
+                               Real alpha) {
+    RealLanes red, green, blue, opacity;
+    IntLanes x, y;
+    red.v = colour.x, green.v = colour.y, blue.v = colour.z, opacity.v = alpha;
+    x.v = column, y.v = row;
+    for (int i = 0; i < LANES; i++)
+        if (x.lane[i] < view->width && y.lane[i] < view->height)
+            film_add(film, counts, y.lane[i] * view->width + x.lane[i], view->width * view->height, view->sample,
+                     (float4)(red.lane[i], green.lane[i], blue.lane[i], opacity.lane[i]));
+}

@@ -25,6 +25,11 @@ typedef JOIN(ulong, LANES_SUFFIX) ULong;
 typedef Int Mask;
 typedef struct { Real x, y, z; } Real3;
 
+// PoCL's own mad() is a multiplication and an addition; contracted, it is one instruction where the device has it.
+#pragma OPENCL FP_CONTRACT ON
+#undef mad
+#define mad(a, b, c) ((a) * (b) + (c))
+
 #define to_real(v) JOIN(convert_float, LANES_SUFFIX)(v)
 #define to_int(v) JOIN(convert_int, LANES_SUFFIX)(v)
 #define to_uint(v) JOIN(convert_uint, LANES_SUFFIX)(v)
@@ -59,6 +64,16 @@ static inline int any_lane(Mask m) { return any(m); }
 // The address of a lane's element when a vector has to be taken apart (scatter, atomics).
 typedef union { Real v; float lane[LANES]; } RealLanes;
 typedef union { Int v; int lane[LANES]; } IntLanes;
+
+static inline float least_lane(Real v) {
+    RealLanes l;
+    l.v = v;
+    float least = l.lane[0];
+    for (int i = 1; i < LANES; i++) least = l.lane[i] < least ? l.lane[i] : least;
+    return least;
+}
+
+static inline float greatest_lane(Real v) { return -least_lane(-v); }
 
 // gather_words(base, byte_offset): 32 bits from base + byte_offset, unaligned, a lane.
 // One AVX-512 or AVX2 instruction where clang has it; plain loads elsewhere. The buffer is padded by 8 bytes.

@@ -2,6 +2,7 @@
 //!
 //! A [`Device`] lives on the thread that opened it (the job engine's), so that everything else stays free of OpenCL.
 
+pub mod cells;
 pub mod program;
 mod select;
 pub mod structs;
@@ -140,6 +141,11 @@ impl Device {
     /// What the device says of itself.
     pub fn info(&self) -> &DeviceInfo {
         &self.info
+    }
+
+    /// Whether a variant is built.
+    pub fn is_built(&self, variant: &Variant) -> bool {
+        self.kernels.contains_key(variant)
     }
 
     /// Builds a variant unless it is there already. PoCL compiles for real at the first launch, so a caller that wants it

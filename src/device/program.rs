@@ -32,6 +32,8 @@ pub struct Source {
     pub arguments: usize,
     /// Every variant that may be built.
     pub variants: fn() -> Vec<Variant>,
+    /// How many of them, from the first, are built before the service is ready; the others when they are first asked for.
+    pub common: usize,
 }
 
 fn read(overrides: Option<&Path>, name: &str) -> Result<String> {

@@ -42,8 +42,14 @@ macro_rules! device_struct {
     ($(#[$meta:meta])* pub struct $name:ident { $($(#[$field_meta:meta])* pub $field:ident: $type:ty,)* }) => {
         $(#[$meta])*
         #[repr(C)]
-        #[derive(Debug, Clone, Copy, PartialEq, Default, bytemuck::Pod, bytemuck::Zeroable)]
+        #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
         pub struct $name { $($(#[$field_meta])* pub $field: $type,)* }
+
+        impl Default for $name {
+            fn default() -> Self {
+                bytemuck::Zeroable::zeroed()
+            }
+        }
 
         impl $crate::device::structs::DeviceStruct for $name {
             const NAME: &'static str = stringify!($name);
@@ -58,6 +64,11 @@ macro_rules! device_struct {
         }
     };
 }
+
+/// The most lights that a view has.
+pub const LIGHTS: usize = 4;
+/// The most clipping planes that a view has: eight, and the six faces of a crop box.
+pub const PLANES: usize = 14;
 
 device_struct! {
     /// What every view kernel is told of the camera, the image and the pass. See `kernels/shared/camera.h`.
@@ -90,8 +101,8 @@ device_struct! {
         pub full_width: i32,
         /// This pass renders every `stride`-th pixel of the full image.
         pub stride: i32,
-        /// Number of the first tile of this launch.
-        pub first_tile: i32,
+        /// Number of the first beam of this launch.
+        pub first_beam: i32,
         /// Number of the sample in its film, from 0.
         pub sample: i32,
         /// Which film: keeps the random numbers of the films apart.
@@ -102,5 +113,27 @@ device_struct! {
         pub offset: [f32; 2],
         /// The step along the ray, world units.
         pub step: f32,
+        /// Whether samples lie at random places within their steps (1) or in the middle (0).
+        pub jittered: i32,
+        /// How many clipping planes there are.
+        pub planes: i32,
+        /// Four numbers a plane, index units: a x + b y + c z + d is not negative where the volume is shown.
+        pub plane_index: [f32; 4 * PLANES],
+        /// Row by row: world gradient = this × gradient in index units.
+        pub world_gradient_from_index: [f32; 9],
+        /// Weight of light from everywhere.
+        pub ambient: f32,
+        /// Weight of Lambert's term.
+        pub diffuse: f32,
+        /// Weight of the highlight.
+        pub specular: f32,
+        /// Exponent of the highlight.
+        pub shininess: f32,
+        /// How many lights there are.
+        pub lights: i32,
+        /// Towards each light, world space, unit length.
+        pub light_direction: [f32; 3 * LIGHTS],
+        /// Linear colour of each light.
+        pub light_color: [f32; 3 * LIGHTS],
     }
 }

@@ -11,7 +11,8 @@ use serde_json::{Value, json};
 use super::field_run::FieldRun;
 use super::view_run::{Pass, ViewRun};
 use super::{Job, Snapshot};
-use crate::device::program::Variant;
+use crate::device::cells::{self, Cells};
+use crate::device::program::{Source, Variant};
 use crate::device::{Buffer, Device};
 use crate::error::{Error, Result};
 use crate::film::Film;
@@ -28,67 +29,75 @@ const FRAME_EVERY: Duration = Duration::from_millis(30);
 /// Device memory for volumes that no job uses just now.
 const IDLE_VOLUME_BYTES: usize = 1 << 30;
 
+/// A volume on the device.
+pub(super) struct DeviceVolume {
+    pub voxels: Buffer,
+    pub cells: Cells,
+}
+
+impl DeviceVolume {
+    fn bytes(&self) -> usize {
+        self.voxels.len() + self.cells.ranges.len()
+    }
+}
+
 /// Everything on the device that outlives a job.
 pub(super) struct DeviceContext {
     pub device: Device,
-    volumes: HashMap<usize, (Weak<Volume>, Rc<Buffer>)>,
-    /// Rays per millisecond of the last pass, by kernel variant: whether a preview is worth it.
-    speed: HashMap<Variant, f64>,
+    volumes: HashMap<usize, (Weak<Volume>, Rc<DeviceVolume>)>,
 }
 
 impl DeviceContext {
-    /// Builds every variant of every technique and launches each once on a tiny case: PoCL compiles at the first launch.
+    /// Builds the common variants of every technique and launches each once on a tiny case: PoCL compiles at the first launch.
     pub fn warm(mut device: Device) -> Result<Self> {
         let started = Instant::now();
-        for t in technique::ALL {
-            let source = (t.source)();
-            for variant in (source.variants)() {
-                device.build(&source, &variant)?;
-                // Zeroed buffers ask for an image of no pixels or a launch of no histories: compiled, and nothing done.
-                let zero: Vec<Buffer> = (0..7).map(|_| device.upload(&[0; 512], 0)).collect::<Result<_>>()?;
-                let arguments: Vec<&Buffer> = zero.iter().take(source.arguments).collect();
-                device.run(&variant, &arguments, 1)?;
+        for source in technique::ALL.iter().map(|t| (t.source)()).chain(cells::sources()) {
+            for variant in (source.variants)().iter().take(source.common) {
+                warm(&mut device, &source, variant)?;
             }
         }
         tracing::info!(ms = started.elapsed().as_millis() as u64, lanes = device.info().lanes, "kernels are warm");
-        Ok(Self { device, volumes: HashMap::new(), speed: HashMap::new() })
+        Ok(Self { device, volumes: HashMap::new() })
     }
 
-    /// The volume on the device, uploaded at first use.
-    pub fn volume(&mut self, volume: &Arc<Volume>) -> Result<Rc<Buffer>> {
+    /// The volume on the device, uploaded and its cells built at first use.
+    pub fn volume(&mut self, volume: &Arc<Volume>) -> Result<Rc<DeviceVolume>> {
         let key = Arc::as_ptr(volume) as usize;
         if let Some((weak, buffer)) = self.volumes.get(&key)
             && weak.strong_count() > 0
         {
             return Ok(buffer.clone());
         }
-        let buffer = Rc::new(self.device.upload(volume.voxels().as_bytes(), 8)?);
-        self.volumes.insert(key, (Arc::downgrade(volume), buffer.clone()));
+        let voxels = self.device.upload(volume.voxels().as_bytes(), 8)?;
+        let cells = Cells::new(&mut self.device, &voxels, volume.dims(), volume.voxel_type())?;
+        let on_device = Rc::new(DeviceVolume { voxels, cells });
+        self.volumes.insert(key, (Arc::downgrade(volume), on_device.clone()));
         self.tidy();
-        Ok(buffer)
+        Ok(on_device)
     }
 
     /// Lets go of volumes that are gone from the host, and of idle ones past the limit.
     pub fn tidy(&mut self) {
         self.volumes.retain(|_, (weak, _)| weak.strong_count() > 0);
-        let idle = |b: &Rc<Buffer>| Rc::strong_count(b) == 1;
-        let mut bytes: usize = self.volumes.values().filter(|(_, b)| idle(b)).map(|(_, b)| b.len()).sum();
-        self.volumes.retain(|_, (_, buffer)| {
-            let drop = bytes > IDLE_VOLUME_BYTES && idle(buffer);
-            bytes -= if drop { buffer.len() } else { 0 };
+        let idle = |v: &Rc<DeviceVolume>| Rc::strong_count(v) == 1;
+        let mut bytes: usize = self.volumes.values().filter(|(_, v)| idle(v)).map(|(_, v)| v.bytes()).sum();
+        self.volumes.retain(|_, (_, volume)| {
+            let drop = bytes > IDLE_VOLUME_BYTES && idle(volume);
+            bytes -= if drop { volume.bytes() } else { 0 };
             !drop
         });
     }
+}
 
-    /// Notes how many rays a millisecond a variant managed, for `expected_ms`.
-    pub fn measured(&mut self, variant: &Variant, rays: usize, took: Duration) {
-        self.speed.insert(*variant, rays as f64 / (took.as_secs_f64() * 1e3).max(1e-3));
+/// Builds a variant and launches it once on nothing.
+pub(super) fn warm(device: &mut Device, source: &Source, variant: &Variant) -> Result<()> {
+    if device.is_built(variant) {
+        return Ok(());
     }
-
-    /// Milliseconds that so many rays are likely to take, where the variant has run before.
-    pub fn expected_ms(&self, variant: &Variant, rays: usize) -> Option<f64> {
-        self.speed.get(variant).map(|per_ms| rays as f64 / per_ms)
-    }
+    device.build(source, variant)?;
+    // Zeroed buffers ask for an image of no pixels or a launch of no histories: compiled, and nothing done.
+    let zero: Vec<Buffer> = (0..source.arguments).map(|_| device.upload(&[0; 1024], 0)).collect::<Result<_>>()?;
+    device.run(variant, &zero.iter().collect::<Vec<_>>(), 1).map(drop)
 }
 
 /// What a turn came to.
@@ -255,8 +264,8 @@ impl Live {
         }
         match self.verdict(context, pass)? {
             Verdict::Refine => {
-                if let Some(view) = &mut self.view {
-                    view.halve_step(context.device.info());
+                if let (Some(view), Some(scene), Some(volume)) = (&mut self.view, &self.scene, &self.volume) {
+                    view.halve_step(context, scene, volume)?;
                 }
                 Ok(Turn::Again)
             }

@@ -1,30 +1,29 @@
 //! A view on the device: its buffers and the order of its passes.
 //!
-//! First a preview of every fourth pixel, then the control: every second pixel at twice the step. The passes proper follow,
-//! and the control gets another sample each time their number has doubled, so that it always costs little and knows enough.
+//! First the control: every fourth pixel at twice the step, which is also the first picture. The passes proper follow, and the
+//! control gets another sample each time their number has doubled, so that it always costs little and knows enough.
 
 use std::rc::Rc;
 use std::time::Duration;
 
 use glam::Vec2;
 
-use super::live::DeviceContext;
+use super::live::{DeviceContext, DeviceVolume, warm};
 use super::pace::Pace;
+use crate::device::Buffer;
 use crate::device::structs::View as DeviceView;
-use crate::device::{Buffer, DeviceInfo};
 use crate::error::Result;
 use crate::film::{Film, Samples};
 use crate::scene::{self, Scene};
 use crate::technique::ViewPlan;
 use crate::volume::Volume;
 
-/// A pass is skipped as a preview when the picture itself is likely to take less than this.
-const QUICK_MS: f64 = 40.0;
 /// The shortest step that `max_error` leads to, in voxels: the shortest that a request may ask for.
 const LEAST_STEP_VOXELS: f64 = 0.05;
-/// Strides of preview, control and the passes proper.
-const PREVIEW: usize = 4;
-const CONTROL: usize = 2;
+/// Stride of the control, and of that of a picture whose shorter side is below `SMALL`.
+const CONTROL: usize = 4;
+const CONTROL_SMALL: usize = 2;
+const SMALL: usize = 200;
 
 /// One set of samples on the device.
 struct Layer {
@@ -33,6 +32,8 @@ struct Layer {
     height: usize,
     stride: usize,
     samples: u32,
+    /// The kernel's table for its step.
+    table: Buffer,
     /// Tells its random numbers from the others'.
     stream: u32,
 }
@@ -40,7 +41,6 @@ struct Layer {
 /// Which layer a pass goes to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Pass {
-    Preview,
     Control,
     Main,
 }
@@ -48,9 +48,8 @@ pub(super) enum Pass {
 /// A view at work.
 pub(super) struct ViewRun {
     plan: ViewPlan,
-    voxels: Rc<Buffer>,
+    volume: Rc<DeviceVolume>,
     distances: Buffer,
-    table: Buffer,
     parameters: Buffer,
     view_buffer: Buffer,
     counts: Buffer,
@@ -58,17 +57,15 @@ pub(super) struct ViewRun {
     view: DeviceView,
     pass_view: DeviceView,
     size: [usize; 2],
-    layers: [Layer; 3],
+    layers: [Layer; 2],
     pass: Option<Pass>,
     cursor: usize,
-    wants_preview: bool,
     pace: Pace,
     /// The longest way through the volume, world units.
     longest: f64,
     least_step: f32,
-    /// Device time since the start, and of the pass under way.
+    /// Device time since the start.
     pub device_time: Duration,
-    pass_time: Duration,
 }
 
 fn index(pass: Pass) -> usize {
@@ -77,25 +74,32 @@ fn index(pass: Pass) -> usize {
 
 impl ViewRun {
     pub fn new(context: &mut DeviceContext, scene: &Scene, volume: &std::sync::Arc<Volume>) -> Result<Self> {
-        let plan = scene.view().plan(volume)?;
+        let mut plan = scene.view().plan(volume)?;
+        warm(&mut context.device, &(scene.technique().source)(), &plan.variant)?;
+        let on_device = context.volume(volume)?;
+        let distances = distances(context, &on_device, volume, &mut plan)?;
         let size = scene.image().map(|n| n as usize);
         let device = &context.device;
-        let layer = |stride: usize, stream: u32| -> Result<Layer> {
+        let layer = |stride: usize, stream: u32, step: f32| -> Result<Layer> {
             let (width, height) = (size[0].div_ceil(stride), size[1].div_ceil(stride));
-            Ok(Layer { buffer: device.allocate(20 * width * height)?, width, height, stride, samples: 0, stream })
+            let table = device.upload(bytemuck::cast_slice(&scene.view().table(volume, step)?), 8)?;
+            Ok(Layer {
+                buffer: device.allocate(20 * width * height)?,
+                width,
+                height,
+                stride,
+                samples: 0,
+                table,
+                stream,
+            })
         };
-        let layers = [layer(PREVIEW, 2)?, layer(CONTROL, 1)?, layer(1, 0)?];
+        let sparse = if size[0].min(size[1]) < SMALL { CONTROL_SMALL } else { CONTROL };
+        let layers = [layer(sparse, 1, 2.0 * plan.step)?, layer(1, 0, plan.step)?];
         let parameters = device.upload(&scene.view().parameters(volume, scene.camera())?, 0)?;
-        let mut view = scene.camera().device_view(scene.image(), volume);
-        view.full_width = size[0] as i32;
-        view.seed = [scene.seed() as u32, (scene.seed() >> 32) as u32];
-        let distances = device.upload(&plan.distances, 8)?;
-        let table = device.upload(bytemuck::cast_slice(&plan.table), 0)?;
+        let view = Self::view(scene, volume);
         let view_buffer = device.allocate(size_of::<DeviceView>())?;
         let counts = device.upload(&[0; 32], 0)?;
-        let wants_preview = context.expected_ms(&plan.variant, size[0] * size[1]).is_none_or(|ms| ms > QUICK_MS);
-        let voxels = context.volume(volume)?;
-        let (pass, cursor, device_time, pass_time) = (None, 0, Duration::ZERO, Duration::ZERO);
+        let (pass, cursor, device_time) = (None, 0, Duration::ZERO);
         let longest = 2.0 * scene::radius(volume);
         let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
         Ok(Self {
@@ -103,9 +107,8 @@ impl ViewRun {
             longest,
             least_step: (LEAST_STEP_VOXELS * smallest) as f32,
             plan,
-            voxels,
+            volume: on_device,
             distances,
-            table,
             parameters,
             view_buffer,
             counts,
@@ -115,28 +118,28 @@ impl ViewRun {
             layers,
             pass,
             cursor,
-            wants_preview,
             device_time,
-            pass_time,
         })
+    }
+
+    /// What all passes are told.
+    fn view(scene: &Scene, volume: &Volume) -> DeviceView {
+        let mut view = scene.camera().device_view(scene.image(), volume);
+        view.full_width = scene.image()[0] as i32;
+        view.seed = [scene.seed() as u32, (scene.seed() >> 32) as u32];
+        scene.view().look(scene.camera(), &mut view);
+        view
     }
 
     /// Another camera: everything gathered so far is of the old one.
     pub fn restart(&mut self, context: &mut DeviceContext, scene: &Scene, volume: &Volume) -> Result<()> {
-        let keep = self.view;
-        self.view = DeviceView {
-            full_width: keep.full_width,
-            seed: keep.seed,
-            ..scene.camera().device_view(scene.image(), volume)
-        };
+        self.view = Self::view(scene, volume);
         context.device.write(&mut self.parameters, 0, &scene.view().parameters(volume, scene.camera())?)?;
         context.device.write(&mut self.counts, 0, &[0; 32])?;
         self.pace = Pace::new(context.device.info(), self.longest / f64::from(self.plan.step));
         for layer in &mut self.layers {
             layer.samples = 0;
         }
-        self.wants_preview =
-            context.expected_ms(&self.plan.variant, self.size[0] * self.size[1]).is_none_or(|ms| ms > QUICK_MS);
         (self.pass, self.cursor, self.device_time) = (None, 0, Duration::ZERO);
         Ok(())
     }
@@ -153,12 +156,16 @@ impl ViewRun {
 
     /// Starts over with half the step: what was gathered has the error of the longer one. The passes proper of the longer step
     /// would make a good control, but for their number; a fresh one costs an eighth of a pass.
-    pub fn halve_step(&mut self, info: &DeviceInfo) {
+    pub fn halve_step(&mut self, context: &DeviceContext, scene: &Scene, volume: &Volume) -> Result<()> {
         self.plan.step *= 0.5;
-        self.pace = Pace::new(info, self.longest / f64::from(self.plan.step));
-        self.layers.iter_mut().for_each(|layer| layer.samples = 0);
-        self.wants_preview = false;
+        self.pace = Pace::new(context.device.info(), self.longest / f64::from(self.plan.step));
+        for (layer, step) in self.layers.iter_mut().zip([2.0 * self.plan.step, self.plan.step]) {
+            layer.samples = 0;
+            let table = scene.view().table(volume, step)?;
+            context.device.write(&mut layer.table, 0, bytemuck::cast_slice(&table))?;
+        }
         (self.pass, self.cursor) = (None, 0);
+        Ok(())
     }
 
     pub fn plan(&self) -> &ViewPlan {
@@ -166,15 +173,9 @@ impl ViewRun {
     }
 
     fn next_pass(&self) -> Pass {
-        let [preview, control, main] = &self.layers;
+        let [control, main] = &self.layers;
         let owed = if main.samples < 2 { 1 } else { 1 + main.samples.ilog2() };
-        if self.wants_preview && preview.samples == 0 && control.samples == 0 {
-            Pass::Preview
-        } else if control.samples < owed {
-            Pass::Control
-        } else {
-            Pass::Main
-        }
+        if control.samples < owed { Pass::Control } else { Pass::Main }
     }
 
     /// Works for about `slice` and says which pass it finished, if one.
@@ -185,36 +186,28 @@ impl ViewRun {
         };
         let layer = &self.layers[index(pass)];
         let lanes = context.device.info().lanes as usize;
-        let (tile_w, tile_h) = match lanes {
-            16 => (4, 4),
-            8 => (4, 2),
-            4 => (2, 2),
-            _ => (1, 1),
-        };
-        let tiles = layer.width.div_ceil(tile_w) * layer.height.div_ceil(tile_h);
-        let items = self.pace.items(context.device.info(), slice, lanes).min(tiles - self.cursor);
-        self.pass_view.first_tile = self.cursor as i32;
+        let [beam_w, beam_h] = beam_pixels(lanes);
+        let beams = layer.width.div_ceil(beam_w) * layer.height.div_ceil(beam_h);
+        let rays = beam_w * beam_h;
+        let items = self.pace.items(context.device.info(), slice, rays).min(beams - self.cursor);
+        self.pass_view.first_beam = self.cursor as i32;
         context.device.write(&mut self.view_buffer, 0, bytemuck::bytes_of(&self.pass_view))?;
         let layer = &self.layers[index(pass)];
         let arguments = [
             &self.view_buffer,
             &self.parameters,
-            &*self.voxels,
+            &self.volume.voxels,
             &self.distances,
-            &self.table,
+            &layer.table,
             &layer.buffer,
             &self.counts,
         ];
         let took = context.device.run(&self.plan.variant, &arguments, items)?;
-        self.pace.learn(items, lanes, took);
+        self.pace.learn(items, rays, took);
         self.device_time += took;
-        self.pass_time += took;
         self.cursor += items;
-        if self.cursor < tiles {
+        if self.cursor < beams {
             return Ok(None);
-        }
-        if pass == Pass::Main {
-            context.measured(&self.plan.variant, self.size[0] * self.size[1], self.pass_time);
         }
         self.layers[index(pass)].samples += 1;
         (self.pass, self.cursor) = (None, 0);
@@ -238,13 +231,12 @@ impl ViewRun {
         };
         self.pass_view = view;
         self.pass = Some(pass);
-        self.pass_time = Duration::ZERO;
         pass
     }
 
-    /// Reads what there is to see: the passes proper, or before the first of them the finer of control and preview.
+    /// Reads what there is to see: the passes proper, or before the first of them the control.
     pub fn film(&self, context: &DeviceContext) -> Result<Film> {
-        let [preview, control, main] = &self.layers;
+        let [control, main] = &self.layers;
         let read = |layer: &Layer| -> Result<Samples> {
             let pixels = layer.width * layer.height;
             let (mut mean, mut m2) = (vec![0.0f32; 4 * pixels], vec![0.0f32; pixels]);
@@ -259,7 +251,7 @@ impl ViewRun {
                 m2,
             })
         };
-        let shown = [main, control, preview].into_iter().find(|l| l.samples > 0).unwrap_or(preview);
+        let shown = if main.samples > 0 { main } else { control };
         let control = (shown.stride == 1 && control.samples > 0).then(|| read(control)).transpose()?;
         let opacity_threshold = self.plan.opacity_threshold;
         Ok(Film { size: self.size, main: read(shown)?, control, opacity_threshold, field_error: None })
@@ -270,6 +262,42 @@ impl ViewRun {
         let mut counts = [0u32; 1];
         context.device.read(&self.counts, 0, &mut counts)?;
         Ok(u64::from(counts[0]))
+    }
+}
+
+/// How far each cell is from anything that the plan wants to see; a byte is enough where nothing is skipped.
+fn distances(
+    context: &mut DeviceContext,
+    on_device: &DeviceVolume,
+    volume: &Volume,
+    plan: &mut ViewPlan,
+) -> Result<Buffer> {
+    let [wide, high, deep] = on_device.cells.dims();
+    let Some(values) = &plan.occupied else { return context.device.upload(&vec![0; wide * high * deep], 0) };
+    // Raw values, rounded outwards.
+    let raw = |v: f64| (v - volume.inter()) / volume.slope();
+    let intervals: Vec<[f32; 2]> = values
+        .iter()
+        .map(|&[low, high]| {
+            let ends = [raw(low).min(raw(high)) as f32, raw(low).max(raw(high)) as f32];
+            [ends[0].next_down(), ends[1].next_up()]
+        })
+        .collect();
+    let distances = on_device.cells.distances(&mut context.device, &intervals)?;
+    let mut bytes = vec![0u8; wide * high * deep];
+    context.device.read(&distances, 0, &mut bytes)?;
+    let empty = bytes.iter().filter(|d| **d > 0).count();
+    plan.reasons.push(format!("{empty} of {} macro-cells are empty under it", bytes.len()));
+    Ok(distances)
+}
+
+/// Pixels across and down of a work-item: `BEAM_W` × `TILE_W` and `BEAM_H` × `TILE_H` of `kernels/shared/packet.h`.
+fn beam_pixels(lanes: usize) -> [usize; 2] {
+    match lanes {
+        16 => [8, 8],
+        8 => [8, 4],
+        4 => [4, 4],
+        _ => [1, 1],
     }
 }
 

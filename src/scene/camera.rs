@@ -145,6 +145,10 @@ impl Camera {
             t_eye: ahead as f32,
             perspective: if self.perspective { -1 } else { 0 },
             dims: volume.dims().map(|n| n as i32),
+            // A gradient is a covector: it goes to the world by the transpose of index-from-world. The sign of the slope does
+            // not matter, since lights are two-sided.
+            world_gradient_from_index: volume.world_from_index().matrix3.inverse().to_cols_array().map(|v| v as f32),
+            jittered: 1,
             ..View::default()
         }
     }

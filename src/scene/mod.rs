@@ -1,6 +1,7 @@
 //! The validated scene. Fields are private: what a `Scene` holds has been checked, and nothing downstream checks again.
 
 pub mod camera;
+pub mod light;
 pub mod transfer;
 
 use std::sync::Arc;

@@ -207,19 +207,46 @@ impl TransferFunction {
         }
     }
 
-    /// The device's table over [`TransferFunction::domain`]: `TABLE_SIZE` opacities, then red and green, then blue, as pairs of 16 bits.
-    pub fn table(&self, opacity_scale: f64) -> Vec<f32> {
+    /// The intervals of values that the device's table gives any opacity, in rising order.
+    pub fn opaque(&self) -> Vec<[f64; 2]> {
         let [low, high] = self.domain();
-        let mut table = vec![0.0f32; 3 * TABLE_SIZE];
-        let bits = |c: f64| (c.clamp(0.0, 1.0) * 65535.0).round() as u32;
+        let width = (high - low) / (TABLE_SIZE - 1) as f64;
+        let mut intervals: Vec<[f64; 2]> = Vec::new();
         for i in 0..TABLE_SIZE {
-            let (color, sigma) = self.evaluate(low + (high - low) * i as f64 / (TABLE_SIZE - 1) as f64);
-            table[i] = (sigma * opacity_scale) as f32;
-            table[TABLE_SIZE + i] = f32::from_bits(bits(color[0]) | bits(color[1]) << 16);
-            table[2 * TABLE_SIZE + i] = f32::from_bits(bits(color[2]));
+            if self.evaluate(low + width * i as f64).1 <= 0.0 {
+                continue;
+            }
+            // An entry stands for the values nearer to it than to the next, and a little more, since the device rounds; the
+            // outermost for all beyond.
+            let from = if i == 0 { f64::NEG_INFINITY } else { low + width * (i as f64 - 0.6) };
+            let to = if i == TABLE_SIZE - 1 { f64::INFINITY } else { low + width * (i as f64 + 0.6) };
+            match intervals.last_mut() {
+                Some(last) if last[1] >= from => last[1] = to,
+                _ => intervals.push([from, to]),
+            }
         }
-        table
+        intervals
     }
+
+    /// The device's table over [`TransferFunction::domain`] for steps of `step` world units: two words an entry, as `classify` in
+    /// `kernels/emission_absorption.cl` takes them apart.
+    pub fn table(&self, opacity_scale: f64, step: f64) -> Vec<u32> {
+        let [low, high] = self.domain();
+        let entry = |i: usize| {
+            let (color, sigma) = self.evaluate(low + (high - low) * i as f64 / (TABLE_SIZE - 1) as f64);
+            pack(color, -(-sigma * opacity_scale * step).exp_m1())
+        };
+        (0..TABLE_SIZE).flat_map(entry).collect()
+    }
+}
+
+/// A colour and an opacity in two words: the float of the opacity, rounded to 13 bits after the point, and in its ten lowest and
+/// two highest bits the square root of blue; then red and green.
+fn pack(color: [f64; 3], opacity: f64) -> [u32; 2] {
+    let bits = |c: f64, most: f64| (c.clamp(0.0, 1.0) * most).round() as u32;
+    let root = bits(color[2].max(0.0).sqrt(), 4095.0);
+    let opacity = ((opacity.clamp(0.0, 1.0) as f32).to_bits() + 0x200) & 0x3fff_fc00;
+    [opacity | root >> 2 | root << 30, bits(color[0], 65535.0) | bits(color[1], 65535.0) << 16]
 }
 
 fn evaluate_points(points: &[ControlPoint], value: f64) -> ([f64; 3], f64) {

@@ -24,7 +24,6 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -33,9 +32,10 @@ use super::{Kind, Technique, View, ViewPlan};
 use crate::device::program::{Source, Variant};
 use crate::device::structs::{DeviceStruct, View as DeviceView};
 use crate::device_struct;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::request;
 use crate::scene::camera::Camera;
+use crate::scene::light::LightRequest;
 use crate::scene::transfer::{TABLE_SIZE, TransferFunction, TransferRequest};
 use crate::volume::{Volume, VoxelType};
 
@@ -58,18 +58,6 @@ device_struct! {
         pub table_offset: f32,
         /// A ray ends when less than this gets through.
         pub transmittance_floor: f32,
-        /// Weight of light from everywhere.
-        pub ambient: f32,
-        /// Weight of Lambert's term.
-        pub diffuse: f32,
-        /// Weight of the highlight.
-        pub specular: f32,
-        /// Exponent of the highlight.
-        pub shininess: f32,
-        /// Towards the light, world space, unit length.
-        pub light: [f32; 3],
-        /// Row by row: world gradient = this × gradient in index units.
-        pub world_gradient_from_index: [f32; 9],
     }
 }
 
@@ -95,7 +83,7 @@ pub struct Parameters {
     #[serde(default)]
     shading: bool,
     /// The light of `shading`.
-    light: Option<Light>,
+    light: Option<LightRequest>,
     /// `back_to_front` is the plain reference form: no early termination, no skipping.
     #[serde(default = "default_order")]
     #[schemars(extend("enum" = ["front_to_back", "back_to_front"]))]
@@ -103,30 +91,6 @@ pub struct Parameters {
     /// Leap over macro-cells that the transfer function leaves empty. The picture is the same without.
     #[serde(default = "yes")]
     empty_space_skipping: bool,
-}
-
-/// A light from infinity.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Light {
-    /// Towards the light in world space; null is a headlight at the eye.
-    direction: Option<[f64; 3]>,
-    /// Weight of light from everywhere.
-    #[serde(default = "default_ambient")]
-    #[schemars(range(min = 0, max = 1))]
-    ambient: f64,
-    /// Weight of Lambert's term.
-    #[serde(default = "default_diffuse")]
-    #[schemars(range(min = 0, max = 1))]
-    diffuse: f64,
-    /// Weight of the highlight.
-    #[serde(default = "default_specular")]
-    #[schemars(range(min = 0, max = 1))]
-    specular: f64,
-    /// Exponent of the highlight.
-    #[serde(default = "default_shininess")]
-    #[schemars(range(min = 1, max = 1000))]
-    shininess: f64,
 }
 
 fn one() -> f64 {
@@ -141,31 +105,6 @@ fn default_threshold() -> f64 {
 fn default_order() -> String {
     "front_to_back".into()
 }
-fn default_ambient() -> f64 {
-    0.25
-}
-fn default_diffuse() -> f64 {
-    0.75
-}
-fn default_specular() -> f64 {
-    0.25
-}
-fn default_shininess() -> f64 {
-    20.0
-}
-
-impl Default for Light {
-    fn default() -> Self {
-        Self {
-            direction: None,
-            ambient: default_ambient(),
-            diffuse: default_diffuse(),
-            specular: default_specular(),
-            shininess: default_shininess(),
-        }
-    }
-}
-
 /// A request that works as it is.
 pub fn example() -> Value {
     json!({
@@ -187,13 +126,14 @@ const FEATURES: [&[(&str, i32)]; 4] = [
 fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
-        headers: &["shared/lanes.h", "shared/rng.h", "shared/camera.h", "shared/volume.h", "shared/film.h"],
+        headers: super::VIEW_HEADERS,
         structs: || DeviceView::opencl_text() + &EmissionAbsorption::opencl_text(),
         arguments: 7,
         variants: || {
             let types = [VoxelType::U8, VoxelType::I16, VoxelType::U16, VoxelType::F32];
             types.into_iter().flat_map(|t| FEATURES.iter().map(move |f| variant(t, f))).collect()
         },
+        common: usize::MAX,
     }
 }
 
@@ -203,33 +143,10 @@ fn variant(voxel: VoxelType, features: &'static [(&'static str, i32)]) -> Varian
 
 fn parse(parameters: &Value, at: &str) -> Result<Arc<dyn View>> {
     let parameters: Parameters = request::parse(parameters, &(TECHNIQUE.schema)(), at)?;
-    if let Some(direction) = parameters.light.as_ref().and_then(|l| l.direction)
-        && DVec3::from(direction).try_normalize().is_none()
-    {
-        return Err(Error::invalid(
-            format!("{at}/light/direction"),
-            "the direction is zero",
-            "a direction of any length",
-        ));
+    if let Some(light) = &parameters.light {
+        light.check(&format!("{at}/light"))?;
     }
     Ok(Arc::new(parameters))
-}
-
-/// Which macro-cells hold a value with any opacity, by a running count over the table.
-fn distances(volume: &Volume, table: &[f32], [low, high]: [f64; 2]) -> Vec<u8> {
-    let mut solid_before = vec![0u32; TABLE_SIZE + 1];
-    for i in 0..TABLE_SIZE {
-        solid_before[i + 1] = solid_before[i] + u32::from(table[i] > 0.0);
-    }
-    let entry =
-        |v: f32| ((f64::from(v) - low) / (high - low) * (TABLE_SIZE - 1) as f64).clamp(0.0, (TABLE_SIZE - 1) as f64);
-    // One entry more on each side: the device rounds in single precision.
-    let occupied = |min: f32, max: f32| {
-        let from = (entry(min) as usize).saturating_sub(1);
-        let to = (entry(max) as usize + 2).min(TABLE_SIZE);
-        min <= max && solid_before[to] > solid_before[from]
-    };
-    volume.cells().empty_distance(&occupied)
 }
 
 impl Parameters {
@@ -242,38 +159,25 @@ impl Parameters {
 impl View for Parameters {
     fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
         let (function, named) = self.transfer_function(volume)?;
-        let table = function.table(self.opacity_scale);
-        let mut distances = distances(volume, &table, function.domain());
-        let empty = distances.iter().filter(|d| **d > 0).count();
-        let mut reasons = vec![
-            format!("transfer function: {named}"),
-            format!("{} of {} macro-cells are empty under it", empty, distances.len()),
-        ];
-        if !self.empty_space_skipping || self.order == "back_to_front" {
-            distances.fill(0);
+        let skip = self.empty_space_skipping && self.order == "front_to_back";
+        let mut reasons = vec![format!("transfer function: {named}")];
+        if !skip {
             reasons.push("every sample is taken: skipping is off".into());
         }
         let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
         let features = FEATURES[usize::from(self.shading) + 2 * usize::from(self.order == "back_to_front")];
         Ok(ViewPlan {
             variant: variant(volume.voxels().voxel_type(), features),
-            distances,
-            table,
+            occupied: skip.then(|| function.opaque()),
             step: (self.step_voxels * smallest) as f32,
             opacity_threshold: self.opacity_threshold,
             reasons,
         })
     }
 
-    fn parameters(&self, volume: &Volume, camera: &Camera) -> Result<Vec<u8>> {
-        let light = self.light.clone().unwrap_or_default();
-        let towards_light = light.direction.map_or(camera.towards_eye(), |d| DVec3::from(d).normalize());
+    fn parameters(&self, volume: &Volume, _camera: &Camera) -> Result<Vec<u8>> {
         let [low, high] = self.transfer_function(volume)?.0.domain();
         let per_value = (TABLE_SIZE - 1) as f64 / (high - low);
-        // A gradient is a covector: it goes to the world by the transpose of index-from-world. The sign of the slope does not
-        // matter, since the light is two-sided.
-        let covector = volume.world_from_index().matrix3.inverse().transpose();
-        let row_major = covector.transpose().to_cols_array();
         let device = EmissionAbsorption {
             table_scale: (volume.slope() * per_value) as f32,
             // Half an entry, so that a value goes to the nearest.
@@ -283,13 +187,15 @@ impl View for Parameters {
             } else {
                 (1.0 - self.opacity_threshold) as f32
             },
-            ambient: light.ambient as f32,
-            diffuse: light.diffuse as f32,
-            specular: light.specular as f32,
-            shininess: light.shininess as f32,
-            light: towards_light.as_vec3().to_array(),
-            world_gradient_from_index: row_major.map(|v| v as f32),
         };
         Ok(bytemuck::bytes_of(&device).to_vec())
+    }
+
+    fn table(&self, volume: &Volume, step: f32) -> Result<Vec<u32>> {
+        Ok(self.transfer_function(volume)?.0.table(self.opacity_scale, f64::from(step)))
+    }
+
+    fn look(&self, camera: &Camera, view: &mut DeviceView) {
+        self.light.clone().unwrap_or_default().apply(camera, view);
     }
 }

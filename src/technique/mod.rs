@@ -8,12 +8,25 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use crate::device::program::{Source, Variant};
+use crate::device::structs::View as DeviceView;
 use crate::error::Result;
 use crate::scene::camera::{Camera, Framing};
 use crate::volume::Volume;
 
 /// Every technique. Adding one is one line.
 pub const ALL: &[Technique] = &[emission_absorption::TECHNIQUE, photon_transport::TECHNIQUE];
+
+/// The kernel headers that every view is built with, in order.
+pub(crate) const VIEW_HEADERS: &[&str] = &[
+    "shared/lanes.h",
+    "shared/rng.h",
+    "shared/camera.h",
+    "shared/voxel.h",
+    "shared/volume.h",
+    "shared/packet.h",
+    "shared/shade.h",
+    "shared/film.h",
+];
 
 /// What the service knows of a technique.
 pub struct Technique {
@@ -55,10 +68,8 @@ impl Technique {
 pub struct ViewPlan {
     /// The kernel variant.
     pub variant: Variant,
-    /// Chebyshev distance in macro-cells to the nearest occupied one, a byte a cell.
-    pub distances: Vec<u8>,
-    /// Read-only table, such as a transfer function.
-    pub table: Vec<f32>,
+    /// The intervals of values that are worth a sample: macro-cells without any are leapt over. `None` takes every sample.
+    pub occupied: Option<Vec<[f64; 2]>>,
     /// The step of the finest pass, world units.
     pub step: f32,
     /// Past this opacity a ray ends; what it leaves out is part of the error.
@@ -79,6 +90,15 @@ pub trait View: Send + Sync {
     /// # Errors
     /// As [`View::plan`].
     fn parameters(&self, volume: &Volume, camera: &Camera) -> Result<Vec<u8>>;
+    /// The kernel's read-only table for a step, such as a transfer function's opacities.
+    ///
+    /// # Errors
+    /// As [`View::plan`].
+    fn table(&self, _volume: &Volume, _step: f32) -> Result<Vec<u32>> {
+        Ok(Vec::new())
+    }
+    /// What it asks of the fields that all views share, such as its lights.
+    fn look(&self, _camera: &Camera, _view: &mut DeviceView) {}
 }
 
 /// What a field's kernel is run with: data, no device needed to make it.

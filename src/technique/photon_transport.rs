@@ -213,6 +213,7 @@ fn source() -> Source {
         },
         arguments: 5,
         variants: || vec![VARIANT],
+        common: usize::MAX,
     }
 }
 

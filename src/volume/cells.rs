@@ -1,4 +1,4 @@
-//! The grid of cells: least and greatest value of every block of 8³ voxels, from which empty space is skipped and
+//! The grid of cells: least and greatest value of every block of 4³ voxels, from which empty space is skipped and
 //! majorants are taken.
 
 use super::parallel;
@@ -6,12 +6,12 @@ use super::voxels::{Sample, Voxels, with_slice};
 use std::ops::Range;
 
 /// Voxels along an edge of a cell.
-pub const CELL: usize = 8;
+pub const CELL: usize = 4;
 
 /// Least and greatest value in each cell.
 ///
-/// Cell `c` covers the samples with `u` in `[8c, 8c + 8)`. Trilinear interpolation there reads the voxels
-/// `8c − 1 ..= 8c + 8` (clamped to the grid), and `min_max` spans exactly those. The ends are rounded to `f32` but not
+/// Cell `c` covers the samples with `u` in `[4c, 4c + 4)`. Trilinear interpolation there reads the voxels
+/// `4c − 1 ..= 4c + 4` (clamped to the grid), and `min_max` spans exactly those. The ends are rounded to `f32` but not
 /// padded: a kernel's interpolation may leave them by a rounding error.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cells {

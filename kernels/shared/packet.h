@@ -1,0 +1,131 @@
+// The march all views share. A work-item renders a beam: BEAM_W x BEAM_H packets of TILE_W x TILE_H pixels, so that neighbours
+// find each other's voxels in the nearest cache. All rays take their samples on one grid of steps: sample k stands for
+// k h <= t <= (k + 1) h and lies at (k + jitter) h, each pixel with a jitter of its own. So what is empty is skipped for a
+// whole beam by one scalar walk along its middle, and the picture is the one without skipping.
+
+#if LANES == 1
+#define BEAM_W 1
+#define BEAM_H 1
+#else
+#define BEAM_W 2
+#define BEAM_H 2
+#endif
+#define PACKETS (BEAM_W * BEAM_H)
+// Samples between two looks at the cells and at which packets are still going.
+#define STRIDE 4
+
+typedef struct {
+    Int column, row;      // in this pass's pixels
+    Mask inside;          // the picture
+    Real x, y;            // image point in full-size pixels
+    Ray ray;              // t_near > t_far where it misses
+    Real jitter;
+    Real3 start;          // index position of sample k is start + direction (k h)
+    int inner, inner_end; // steps in which every lane takes its whole sample, away from the box's faces by the margin
+} Packet;
+
+typedef struct {
+    float origin[3], direction[3]; // middle of the samples of step k: origin + direction (k h), index units
+    float reach[3];                // no sample of any lane is further from it
+    int begin, end;                // steps in which any lane has a sample
+} Beam;
+
+// How many beams the pass has.
+static inline int beams(constant const View *view) {
+    int w = TILE_W * BEAM_W, h = TILE_H * BEAM_H;
+    return ((view->width + w - 1) / w) * ((view->height + h - 1) / h);
+}
+
+static inline Packet packet_at(constant const View *view, int left, int top, float margin) {
+    Packet p;
+    p.column = left + LANE_IDS % TILE_W;
+    p.row = top + LANE_IDS / TILE_W;
+    p.inside = MASK(p.column < view->width) & MASK(p.row < view->height);
+    Int column = p.column * view->stride, row = p.row * view->stride;
+    UInt4Lanes ctr = {as_UInt(row * view->full_width + column), (UInt)(view->sample), (UInt)(0u), (UInt)(view->stream)};
+    p.jitter = view->jittered ? unit_open(philox(ctr, view->seed[0], view->seed[1]).a) : (Real)(0.5f);
+    p.x = to_real(column) + view->offset[0];
+    p.y = to_real(row) + view->offset[1];
+    p.ray = camera_ray(view, p.x, p.y);
+    p.start = along(p.ray.origin, p.ray.direction, p.jitter * view->step);
+    Ray inner = p.ray;
+    clip_box(view, margin, &inner);
+    float from = greatest_lane(inner.t_near) / view->step, to = least_lane(inner.t_far) / view->step;
+    p.inner = (int)ceil(clamp(from, -1e8f, 1e8f));
+    p.inner_end = (int)floor(clamp(to, -1e8f, 1e8f));
+    return p;
+}
+
+// How far a packet's rays are from the beam's middle ray at the ray parameter t, along one axis.
+static inline float reach_axis(Real origin, Real direction, float middle, float along, float t) {
+    return greatest_lane(fabs((origin - middle) + (direction - along) * t));
+}
+
+static inline Beam beam_at(constant const View *view, int number, float margin, Packet *packets) {
+    int beams_wide = (view->width + TILE_W * BEAM_W - 1) / (TILE_W * BEAM_W);
+    int left = (number % beams_wide) * TILE_W * BEAM_W, top = (number / beams_wide) * TILE_H * BEAM_H;
+    float near = 1e30f, far = -1e30f;
+    for (int i = 0; i < PACKETS; i++) {
+        packets[i] = packet_at(view, left + (i % BEAM_W) * TILE_W, top + (i / BEAM_W) * TILE_H, margin);
+        Mask hit = MASK(packets[i].ray.t_far > packets[i].ray.t_near);
+        near = fmin(near, least_lane(select((Real)(1e30f), packets[i].ray.t_near, hit)));
+        far = fmax(far, greatest_lane(select((Real)(-1e30f), packets[i].ray.t_far, hit)));
+    }
+    Beam b;
+    b.begin = b.end = 0;
+    if (!(far > near)) return b;
+    b.begin = (int)floor(near / view->step);
+    b.end = (int)ceil(far / view->step);
+    RealLanes v;
+    #define MIDDLE(to, first, last) v.v = 0.5f * (first + last); to = 0.5f * (v.lane[0] + v.lane[LANES - 1])
+    // A sample lies anywhere in its step; the middle of the step stands for it.
+    #define AXIS(i, c)                                                                                                     \
+        MIDDLE(b.direction[i], packets[0].ray.direction.c, packets[PACKETS - 1].ray.direction.c);                          \
+        MIDDLE(b.origin[i], packets[0].ray.origin.c, packets[PACKETS - 1].ray.origin.c);                                   \
+        b.reach[i] = 0.0f;                                                                                                 \
+        for (int j = 0; j < PACKETS; j++) {                                                                                \
+            Real o = packets[j].ray.origin.c, d = packets[j].ray.direction.c;                                              \
+            b.reach[i] = fmax(b.reach[i], reach_axis(o, d, b.origin[i], b.direction[i], near - view->step));               \
+            b.reach[i] = fmax(b.reach[i], reach_axis(o, d, b.origin[i], b.direction[i], far + view->step));                \
+        }                                                                                                                  \
+        b.reach[i] += 0.505f * fabs(b.direction[i]) * view->step + 0.01f;                                                  \
+        b.origin[i] += b.direction[i] * 0.5f * view->step;
+    AXIS(0, x)
+    AXIS(1, y)
+    AXIS(2, z)
+    #undef AXIS
+    #undef MIDDLE
+    return b;
+}
+
+// The steps from k on in which no lane's sample is in an occupied cell; 0 where the next may be.
+static inline int beam_leap(constant const View *view, const Beam *b, global const uchar *distances, int k) {
+    float at = (float)k * view->step, steps = 1e8f;
+    int cell[3], count[3];
+    float here[3];
+    for (int i = 0; i < 3; i++) {
+        here[i] = b->origin[i] + b->direction[i] * at;
+        count[i] = (view->dims[i] + CELL - 1) / CELL;
+        cell[i] = clamp((int)(here[i] * (1.0f / CELL)), 0, count[i] - 1);
+    }
+    int distance = distances[(cell[2] * count[1] + cell[1]) * count[0] + cell[0]];
+    if (distance == 0) return 0;
+    for (int i = 0; i < 3; i++) {
+        // The block of empty cells; beyond the box there is nothing either.
+        int first = cell[i] - distance + 1, last = cell[i] + distance;
+        float low = first <= 0 ? -1e8f : (float)(first * CELL), high = last >= count[i] ? 1e8f : (float)(last * CELL);
+        float back = here[i] - b->reach[i] - low, ahead = high - here[i] - b->reach[i], speed = b->direction[i];
+        if (back < 0.0f || ahead < 0.0f) return 0;
+        float room = (speed > 0.0f ? ahead : back) / fmax(fabs(speed) * view->step, 1e-12f);
+        steps = room < steps ? room : steps;
+    }
+    return (int)steps;
+}
+
+// The part of step k that is inside the lane's ray: where its sample lies and for how long it stands, both in t.
+static inline Mask edge_sample(constant const View *view, const Packet *p, int k, Real *t, Real *length) {
+    Real from = fmax((Real)((float)k * view->step), p->ray.t_near), to = fmin((Real)((float)(k + 1) * view->step), p->ray.t_far);
+    *length = to - from;
+    *t = mad(*length, p->jitter, from);
+    return MASK(*length > 0.0f);
+}

@@ -1,0 +1,30 @@
+// Light on a gradient: two-sided Lambert and Blinn-Phong (Blinn, SIGGRAPH 1977), with lights from infinity.
+
+// The gradient in the world from the one in index units: a covector.
+static inline Real3 gradient_world(constant const View *view, Real3 g) {
+    constant const float *m = view->world_gradient_from_index;
+    return real3(mad(m[0], g.x, mad(m[1], g.y, m[2] * g.z)), mad(m[3], g.x, mad(m[4], g.y, m[5] * g.z)),
+                 mad(m[6], g.x, mad(m[7], g.y, m[8] * g.z)));
+}
+
+// `colour` as lit on the world gradient n; `ray` is the unit direction of the ray. Where the field is flat there is no surface
+// to turn towards the light: full diffuse, no highlight.
+static inline Real3 shade(constant const View *view, Real3 n, Real3 ray, Real3 colour) {
+    Real squared = dot3(n, n);
+    Mask flat = MASK(!(squared > 1e-24f));
+    Real scale = select(rsqrt(squared), (Real)(0.0f), flat);
+    Real3 body = real3(view->ambient, view->ambient, view->ambient), shine = real3(0.0f, 0.0f, 0.0f);
+    for (int i = 0; i < view->lights; i++) {
+        constant const float *d = view->light_direction + 3 * i, *c = view->light_color + 3 * i;
+        Real facing = fabs(mad(n.x, d[0], mad(n.y, d[1], n.z * d[2]))) * scale;
+        Real3 h = real3(d[0] - ray.x, d[1] - ray.y, d[2] - ray.z);
+        Real half_length = rsqrt(fmax(dot3(h, h), (Real)(1e-12f)));
+        Real along_half = fmin(fabs(dot3(n, h)) * scale * half_length, (Real)(1.0f));
+        Real lambert = view->diffuse * select(facing, (Real)(1.0f), flat);
+        Real glint = view->specular * exp2(view->shininess * log2(fmax(along_half, (Real)(1e-6f))));
+        glint = select(glint, (Real)(0.0f), flat);
+        body = real3(mad(lambert, c[0], body.x), mad(lambert, c[1], body.y), mad(lambert, c[2], body.z));
+        shine = real3(mad(glint, c[0], shine.x), mad(glint, c[1], shine.y), mad(glint, c[2], shine.z));
+    }
+    return real3(mad(colour.x, body.x, shine.x), mad(colour.y, body.y, shine.y), mad(colour.z, body.z, shine.z));
+}

@@ -1,0 +1,18 @@
+// The type of a voxel: what a volume has on the device is what its file has.
+
+#if VOXEL == VOXEL_U8
+#define VOXEL_BYTES 1
+typedef uchar Voxel;
+#elif VOXEL == VOXEL_I16
+#define VOXEL_BYTES 2
+typedef short Voxel;
+#elif VOXEL == VOXEL_U16
+#define VOXEL_BYTES 2
+typedef ushort Voxel;
+#else
+#define VOXEL_BYTES 4
+typedef float Voxel;
+#endif
+
+// Voxels along an edge of a macro-cell.
+#define CELL 4

@@ -1,0 +1,102 @@
+//! Macro-cells on the device: the least and greatest value in each block of voxels, and from them how far it is to anything
+//! that a view wants to see.
+
+use super::program::{Source, Variant};
+use super::structs::DeviceStruct;
+use super::{Buffer, Device};
+use crate::device_struct;
+use crate::error::Result;
+use crate::volume::VoxelType;
+
+/// Voxels along an edge of a cell: `CELL` in `kernels/shared/voxel.h`.
+pub const CELL: usize = 4;
+
+device_struct! {
+    /// What the kernels of the cells are told.
+    pub struct CellsPass {
+        /// Voxels along x, y, z.
+        pub dims: [i32; 3],
+        /// The axis of a pass of `distances`.
+        pub axis: i32,
+        /// How many intervals of values make a cell occupied.
+        pub intervals: i32,
+    }
+}
+
+const TYPES: [VoxelType; 4] = [VoxelType::U8, VoxelType::I16, VoxelType::U16, VoxelType::F32];
+
+fn variant(kernel: &'static str, voxel: VoxelType) -> Variant {
+    Variant { kernel, voxel: Some(voxel), features: &[] }
+}
+
+fn source(kernel: &'static str, arguments: usize, variants: fn() -> Vec<Variant>) -> Source {
+    Source {
+        kernel,
+        headers: &["shared/voxel.h"],
+        structs: CellsPass::opencl_text,
+        arguments,
+        variants,
+        common: TYPES.len(),
+    }
+}
+
+/// The kernels of the cells.
+pub fn sources() -> [Source; 2] {
+    [
+        source("cells", 3, || TYPES.map(|t| variant("cells", t)).to_vec()),
+        source("distances", 5, || TYPES.map(|t| variant("distances", t)).to_vec()),
+    ]
+}
+
+/// The least and greatest voxel that a sample in each cell can read.
+pub struct Cells {
+    /// Two voxels a cell, in the volume's own type; where all are NaN the least is above the greatest.
+    pub ranges: Buffer,
+    voxel_dims: [usize; 3],
+    voxel: VoxelType,
+}
+
+impl Cells {
+    /// Builds them from the voxels on the device.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Internal`] when the device has no room or a kernel fails.
+    pub fn new(device: &mut Device, voxels: &Buffer, voxel_dims: [usize; 3], voxel: VoxelType) -> Result<Self> {
+        let [build, _] = sources();
+        let kernel = variant("cells", voxel);
+        device.build(&build, &kernel)?;
+        let [wide, high, deep] = voxel_dims.map(|n| n.div_ceil(CELL));
+        let ranges = device.allocate(2 * voxel.bytes() * wide * high * deep)?;
+        let pass = device.upload(bytemuck::bytes_of(&pass(voxel_dims, 0, 0)), 0)?;
+        device.run(&kernel, &[&pass, voxels, &ranges], high * deep)?;
+        Ok(Self { ranges, voxel_dims, voxel })
+    }
+
+    /// Cells along x, y, z.
+    pub fn dims(&self) -> [usize; 3] {
+        self.voxel_dims.map(|n| n.div_ceil(CELL))
+    }
+
+    /// For each cell, x fastest, the Chebyshev distance in cells to the nearest one whose range meets one of `intervals` (raw
+    /// values): 0 in such a cell itself, 255 for 255 or more. In a cell of distance `d` nothing is within `d − 1` cells.
+    ///
+    /// # Errors
+    /// As [`Cells::new`].
+    pub fn distances(&self, device: &mut Device, intervals: &[[f32; 2]]) -> Result<Buffer> {
+        let [_, source] = sources();
+        let kernel = variant("distances", self.voxel);
+        device.build(&source, &kernel)?;
+        let [wide, high, deep] = self.dims();
+        let (a, b) = (device.allocate(wide * high * deep)?, device.allocate(wide * high * deep)?);
+        let wanted = device.upload(bytemuck::cast_slice(intervals), 8)?;
+        for (axis, lines, from, to) in [(0, high * deep, &b, &a), (1, wide * deep, &a, &b), (2, wide * high, &b, &a)] {
+            let pass = device.upload(bytemuck::bytes_of(&pass(self.voxel_dims, axis, intervals.len())), 0)?;
+            device.run(&kernel, &[&pass, &wanted, &self.ranges, from, to], lines)?;
+        }
+        Ok(a)
+    }
+}
+
+fn pass(voxel_dims: [usize; 3], axis: i32, intervals: usize) -> CellsPass {
+    CellsPass { dims: voxel_dims.map(|n| n as i32), axis, intervals: intervals as i32 }
+}
