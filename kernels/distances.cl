@@ -5,6 +5,8 @@
 static inline bool occupied(constant CellsPass *pass, global const float *intervals, global const Voxel *ranges, int cell) {
     float low = (float)ranges[2 * cell], high = (float)ranges[2 * cell + 1];
     if (!(low <= high)) return false;
+    float more = pass->overshoot * (high - low);
+    low -= more, high += more;
     for (int i = 0; i < pass->intervals; i++)
         if (low <= intervals[2 * i + 1] && high >= intervals[2 * i]) return true;
     return false;

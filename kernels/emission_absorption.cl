@@ -7,24 +7,29 @@ typedef struct { Real3 colour; Real alpha; } Optical;
 
 typedef struct { Real3 colour; Real transmittance; } Radiance;
 
-// The transfer function at a raw value, with the opacity of a whole step. An entry is two words: the opacity's float less its
-// ten lowest bits, which with the two highest (an opacity is at most 1) hold the square root of blue; then red and green.
-static inline Optical classify(constant const EmissionAbsorption *params, global const uchar *table, Real raw) {
+// An entry of the table is two words: the opacity's float less its ten lowest bits, which with the two highest (an opacity is
+// at most 1) hold the square root of blue; then red and green.
+static inline Optical optical_entry(global const uchar *table, Int entry) {
     Optical o;
+    Int word = gather_words(table, entry << 3), red_green = gather_words(table + 4, entry << 3);
+    o.alpha = as_Real(word & 0x3ffffc00);
+    Real root = to_real(as_Int(rotate(as_UInt(word), (UInt)(2u))) & 0xfff) * (1.0f / 4095.0f);
+    o.colour = real3(to_real(red_green & 0xffff) * (1.0f / 65535.0f), to_real(as_Int(as_UInt(red_green) >> 16)) * (1.0f / 65535.0f),
+                     root * root);
+    return o;
+}
+
+// The transfer function at a raw value, with the opacity of a whole step; a NaN is empty.
+static inline Optical classify(constant const EmissionAbsorption *params, global const uchar *table, Real raw) {
     Real x = clamp(mad(raw, (Real)(params->table_scale), (Real)(params->table_offset)), (Real)(0.0f), (Real)(TABLE_SIZE - 1));
 #if VOXEL == VOXEL_F32
     Mask nan = MASK(raw != raw);
     x = select(x, (Real)(0.0f), nan);
 #endif
-    Int entry = to_int(x) << 3;
-    Int word = gather_words(table, entry), red_green = gather_words(table + 4, entry);
-    o.alpha = as_Real(word & 0x3ffffc00);
+    Optical o = optical_entry(table, to_int(x));
 #if VOXEL == VOXEL_F32
     o.alpha = select(o.alpha, (Real)(0.0f), nan);
 #endif
-    Real root = to_real(as_Int(rotate(as_UInt(word), (UInt)(2u))) & 0xfff) * (1.0f / 4095.0f);
-    o.colour = real3(to_real(red_green & 0xffff) * (1.0f / 65535.0f), to_real(as_Int(as_UInt(red_green) >> 16)) * (1.0f / 65535.0f),
-                     root * root);
     return o;
 }
 
@@ -39,6 +44,88 @@ static inline void composite(constant const EmissionAbsorption *params, Optical 
     r->transmittance -= weight;
 #endif
 }
+
+// The opacity of `times` the extinction: 1 - (1 - alpha)^times.
+static inline Real opacity_times(Real alpha, Real times) {
+    return select(1.0f - exp2(log2(1.0f - alpha) * times), (Real)(0.0f), MASK(times <= 0.0f));
+}
+
+#if STYLED
+// The transfer function of value and gradient magnitude, 256 x 256 entries.
+static inline Optical classify_2d(constant const EmissionAbsorption *params, global const uchar *table, Real raw, Real magnitude) {
+    Mask nan = MASK(!(magnitude == magnitude && raw == raw));
+    Real v = clamp(mad(raw, (Real)(params->table_scale), (Real)(params->table_offset)), (Real)(0.0f), (Real)(255.0f));
+    Real g = clamp(mad(magnitude, (Real)(params->gradient_scale), (Real)(0.5f)), (Real)(0.0f), (Real)(255.0f));
+    Optical o = optical_entry(table, to_int(select(v, (Real)(0.0f), nan)) + (to_int(select(g, (Real)(0.0f), nan)) << 8));
+    o.alpha = select(o.alpha, (Real)(0.0f), nan);
+    return o;
+}
+
+static inline void styled_step(constant const View *view, constant const EmissionAbsorption *params, global const uchar *voxels,
+                               global const uchar *table, const Packet *p, int k, Radiance *r) {
+    Real t, length, raw;
+    Mask inside = edge_sample(view, p, k, &t, &length);
+    if (!any_lane(inside)) return;
+    Real3 at = along(p->ray.origin, p->ray.direction, t);
+    Surface s = surface_at(view, params, voxels, at, ray_world(view, p->x, p->y), &raw);
+    Optical o = params->gradient_scale > 0.0f ? classify_2d(params, table, raw, s.magnitude) : classify(params, table, raw);
+    Real factor = extinction_factor(params, &s) * (length / view->step);
+    o.alpha = select((Real)(0.0f), opacity_times(o.alpha, factor), inside & MASK(factor == factor));
+    if (!any_lane(MASK(o.alpha > 0.0f))) return;
+    o.colour = styled_colour(view, params, &s, o.colour);
+    composite(params, o, r);
+}
+#endif
+
+#if PREINTEGRATED
+// The table: at each entry the integrals from the first of sigma, sigma r, sigma g, sigma b, then their integrands.
+static inline Real integral(global const uchar *table, int which, Real x) {
+    Int i = min(to_int(x), (Int)(TABLE_SIZE - 2));
+    global const float *column = (global const float *)table + which;
+    Real low = gather_reals(column, i << 3), high = gather_reals(column + 8, i << 3);
+    return mad(high - low, x - to_real(i), low);
+}
+
+// Between two values taken at the ends of a step the value is taken to be linear: the mean of a quantity over them is the
+// difference of its integrals over the difference of the values (Engel, Kraus, Ertl, "High-Quality Pre-Integrated Volume
+// Rendering Using Hardware-Accelerated Pixel Shading", 2001), so the error falls with the square of the step. Values close
+// together take the integrand in their middle.
+static inline Real between(global const uchar *table, int which, Real a, Real b, Mask close) {
+    Real middle = gather_reals((global const float *)table + 4 + which, to_int(0.5f * (a + b) + 0.5f) << 3);
+    if (!any_lane(~close)) return middle;
+    Real mean = (integral(table, which, b) - integral(table, which, a)) / select(b - a, (Real)(1.0f), close);
+    return select(mean, middle, close);
+}
+
+// The place of the value at t in the table, not rounded; NaN where the value is.
+static inline Real place_at(constant const View *view, constant const EmissionAbsorption *params, global const uchar *voxels, const Packet *p,
+                            Real t) {
+    Real raw = sample_raw(view, voxels, along(p->ray.origin, p->ray.direction, t));
+    Real x = clamp(mad(raw, (Real)(params->table_scale), (Real)(params->table_offset - 0.5f)), (Real)(0.0f), (Real)(TABLE_SIZE - 1));
+    return select(x, raw, MASK(raw != raw));
+}
+
+static inline void preintegrated_step(constant const View *view, constant const EmissionAbsorption *params, global const uchar *voxels,
+                                      global const uchar *table, const Packet *p, int k, Radiance *r) {
+    Real from = fmax((Real)((float)k * view->step), p->ray.t_near), to = fmin((Real)((float)(k + 1) * view->step), p->ray.t_far);
+    Mask inside = MASK(to > from);
+    if (!any_lane(inside)) return;
+    Real a = place_at(view, params, voxels, p, from), b = place_at(view, params, voxels, p, to);
+    inside &= MASK(a == a) & MASK(b == b);
+    a = select((Real)(0.0f), a, inside), b = select((Real)(0.0f), b, inside);
+    Mask close = MASK(fabs(b - a) < 4.0f);
+    Real sigma = between(table, 0, a, b, close), inverse = 1.0f / fmax(sigma, (Real)(1e-30f));
+    Optical o;
+    o.alpha = select((Real)(0.0f), 1.0f - exp(-sigma * (to - from)), inside & MASK(sigma > 0.0f));
+    if (!any_lane(MASK(o.alpha > 0.0f))) return;
+    o.colour = real3(between(table, 1, a, b, close) * inverse, between(table, 2, a, b, close) * inverse, between(table, 3, a, b, close) * inverse);
+#if SHADED
+    Real3 at = along(p->ray.origin, p->ray.direction, 0.5f * (from + to));
+    o.colour = shade(view, gradient_world(view, gradient_raw(view, voxels, at)), ray_world(view, p->x, p->y), o.colour);
+#endif
+    composite(params, o, r);
+}
+#endif
 
 // A whole step of every lane, away from the box's faces.
 static inline void inner_step(constant const View *view, constant const EmissionAbsorption *params, global const uchar *voxels,
@@ -63,7 +150,7 @@ static inline void edge_step(constant const View *view, constant const EmissionA
     if (!any_lane(inside)) return;
     Real3 at = along(p->ray.origin, p->ray.direction, t);
     Optical o = classify(params, table, sample_raw(view, voxels, at));
-    Real part = 1.0f - exp2(log2(1.0f - o.alpha) * (length / view->step));
+    Real part = opacity_times(o.alpha, length / view->step);
     o.alpha = select((Real)(0.0f), select(part, o.alpha, MASK(length >= view->step)), inside);
     if (!any_lane(MASK(o.alpha > 0.0f))) return;
 #if SHADED
@@ -74,8 +161,14 @@ static inline void edge_step(constant const View *view, constant const EmissionA
 
 static inline void step(constant const View *view, constant const EmissionAbsorption *params, global const uchar *voxels,
                         global const uchar *table, const Packet *p, int k, Radiance *r) {
+#if PREINTEGRATED
+    preintegrated_step(view, params, voxels, table, p, k, r);
+#elif STYLED
+    styled_step(view, params, voxels, table, p, k, r);
+#else
     if (k >= p->inner && k < p->inner_end) inner_step(view, params, voxels, table, p, (float)k * view->step, r);
     else edge_step(view, params, voxels, table, p, k, r);
+#endif
 }
 
 kernel void emission_absorption(constant View *view, constant EmissionAbsorption *params, global const uchar *voxels,
@@ -110,5 +203,5 @@ kernel void emission_absorption(constant View *view, constant EmissionAbsorption
     }
 #endif
     for (int i = 0; i < PACKETS; i++)
-        film_packet(view, film, counts, packets[i].column, packets[i].row, r[i].colour, 1.0f - r[i].transmittance);
+        film_packet(view, film, counts, packets[i].column, packets[i].row, scale3(r[i].colour, (Real)(params->brightness)), 1.0f - r[i].transmittance);
 }

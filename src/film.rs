@@ -1,9 +1,10 @@
 //! The film on the host: what a view has gathered so far, its estimated error, and the picture of it.
 
+pub mod picture;
+
 use serde::Serialize;
 
-use crate::error::Result;
-use crate::frame;
+use picture::Background;
 
 /// Means and squared deviations of one set of samples, as the device leaves them (`kernels/shared/film.h`).
 #[derive(Debug, Clone, Default)]
@@ -93,6 +94,8 @@ pub struct Film {
     pub opacity_threshold: f64,
     /// Relative change of the picture since the field had half its histories.
     pub field_error: Option<f64>,
+    /// What is behind the volume.
+    pub background: Background,
 }
 
 impl Film {
@@ -170,95 +173,11 @@ impl Film {
         Some(if mean > 0.0 { rms / mean } else { rms })
     }
 
-    /// What a picture of this film says of itself. No times: the same request and number of samples gives the same bytes.
-    pub fn description(&self, error: &ErrorEstimate) -> String {
-        let stride = self.main.stride;
-        serde_json::json!({"samples": self.main.count, "error": error.total, "error_parts": error, "stride": stride})
-            .to_string()
-    }
-
-    /// The film as PNG bytes, and how many values were clipped at white.
-    ///
-    /// # Errors
-    /// `Error::Internal` when the encoder fails.
-    pub fn png(&self, error: &ErrorEstimate) -> Result<(Vec<u8>, u64)> {
-        let (rgb, clipped) = self.srgb8();
-        Ok((frame::png(self.size, &rgb, self.description(error))?, clipped))
-    }
-
-    /// The film as OpenEXR bytes.
-    ///
-    /// # Errors
-    /// `Error::Internal` when the encoder fails.
-    pub fn exr(&self, error: &ErrorEstimate) -> Result<Vec<u8>> {
-        frame::exr(self.size, &self.linear_rgb(), &self.description(error))
-    }
-
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         let held = |s: &Samples| 4 * (s.mean.len() + s.m2.len());
         held(&self.main) + self.control.as_ref().map_or(0, held)
     }
-
-    /// The picture in linear R, G, B, row by row from the top; a preview is interpolated to the full size.
-    pub fn linear_rgb(&self) -> Vec<f32> {
-        let [width, height] = self.size;
-        if self.main.stride == 1 {
-            return self.main.mean.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
-        }
-        let mut out = Vec::with_capacity(width * height * 3);
-        let place = |full: usize, n: usize| {
-            let at = (full as f32 / self.main.stride as f32).min((n - 1) as f32);
-            let low = (at as usize).min(n.saturating_sub(2));
-            (low, (low + 1).min(n - 1), at - low as f32)
-        };
-        for y in 0..height {
-            let (y0, y1, fy) = place(y, self.main.height);
-            for x in 0..width {
-                let (x0, x1, fx) = place(x, self.main.width);
-                for c in 0..3 {
-                    let at = |x: usize, y: usize| self.main.mean[4 * (y * self.main.width + x) + c];
-                    let (top, low) =
-                        (at(x0, y0) + (at(x1, y0) - at(x0, y0)) * fx, at(x0, y1) + (at(x1, y1) - at(x0, y1)) * fx);
-                    out.push(top + (low - top) * fy);
-                }
-            }
-        }
-        out
-    }
-
-    /// The picture in sRGB bytes (IEC 61966-2-1), clipped at 1, and how many values were clipped.
-    pub fn srgb8(&self) -> (Vec<u8>, u64) {
-        let table = srgb_table();
-        let mut clipped = 0u64;
-        let encode = |v: f32, clipped: &mut u64| {
-            *clipped += u64::from(v > 1.0);
-            table[(v.clamp(0.0, 1.0) * 65535.0 + 0.5) as usize]
-        };
-        let bytes = if self.main.stride == 1 {
-            let mut out = Vec::with_capacity(self.main.pixels() * 3);
-            for p in self.main.mean.chunks_exact(4) {
-                out.extend_from_slice(&[
-                    encode(p[0], &mut clipped),
-                    encode(p[1], &mut clipped),
-                    encode(p[2], &mut clipped),
-                ]);
-            }
-            out
-        } else {
-            self.linear_rgb().into_iter().map(|v| encode(v, &mut clipped)).collect()
-        };
-        (bytes, clipped)
-    }
-}
-
-/// sRGB bytes by linear value in steps of 2^-16: a step is a twentieth of a grey level where the curve is steepest.
-fn srgb_table() -> &'static [u8] {
-    static TABLE: std::sync::OnceLock<Vec<u8>> = std::sync::OnceLock::new();
-    TABLE.get_or_init(|| {
-        let encode = |v: f64| if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
-        (0..=65535).map(|i| (encode(f64::from(i) / 65535.0) * 255.0).round() as u8).collect()
-    })
 }
 
 #[cfg(test)]

@@ -6,34 +6,38 @@ use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer,
 
 use crate::error::{Error, Result};
 
-/// 8-bit sRGB as PNG, by the encoder's fast path: a frame is looked at once. `description` goes into its text chunk, under the
+/// 8-bit sRGB, three or four bytes a pixel, as PNG, by the encoder's fast path: a frame is looked at once. `description` goes into its text chunk, under the
 /// keyword `Cloudchamber`.
 ///
 /// # Errors
 /// [`Error::Internal`] when the encoder fails.
-pub fn png([width, height]: [usize; 2], rgb: &[u8], description: String) -> Result<Vec<u8>> {
-    let mut bytes = Vec::with_capacity(rgb.len() / 2);
+pub fn png([width, height]: [usize; 2], picture: &[u8], description: String) -> Result<Vec<u8>> {
+    let mut bytes = Vec::with_capacity(picture.len() / 2);
+    let alpha = picture.len() == 4 * width * height;
     let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
-    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_color(if alpha { png::ColorType::Rgba } else { png::ColorType::Rgb });
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_compression(png::Compression::Fast);
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
     encoder.add_text_chunk("Cloudchamber".into(), description).map_err(Error::internal)?;
     let mut writer = encoder.write_header().map_err(Error::internal)?;
-    writer.write_image_data(rgb).map_err(Error::internal)?;
+    writer.write_image_data(picture).map_err(Error::internal)?;
     writer.finish().map_err(Error::internal)?;
     Ok(bytes)
 }
 
-/// Linear RGB in 32-bit floats as OpenEXR; `description` goes into its comments.
+/// Linear RGB, or RGB and alpha, in 32-bit floats as OpenEXR; `description` goes into its comments.
 ///
 /// # Errors
 /// [`Error::Internal`] when the encoder fails.
-pub fn exr([width, height]: [usize; 2], rgb: &[f32], description: &str) -> Result<Vec<u8>> {
+pub fn exr([width, height]: [usize; 2], picture: &[f32], description: &str) -> Result<Vec<u8>> {
+    let count = picture.len() / (width * height).max(1);
     let channel = |name: &str, c: usize| {
-        AnyChannel::new(name, FlatSamples::F32(rgb.iter().skip(c).step_by(3).copied().collect()))
+        AnyChannel::new(name, FlatSamples::F32(picture.iter().skip(c).step_by(count).copied().collect()))
     };
-    let channels = AnyChannels::sort([channel("R", 0), channel("G", 1), channel("B", 2)].into_iter().collect());
+    let channels = AnyChannels::sort(
+        ["R", "G", "B", "A"].iter().take(count).enumerate().map(|(c, name)| channel(name, c)).collect(),
+    );
     let mut attributes = LayerAttributes::named("cloudchamber");
     attributes.comments = exr::prelude::Text::new_or_none(description);
     let layer = Layer::new((width, height), attributes, Encoding::FAST_LOSSLESS, channels);

@@ -25,6 +25,8 @@ pub struct RenderRequest {
     pub camera: Option<CameraRequest>,
     /// Size of the picture.
     pub image: Option<ImageRequest>,
+    /// What of the volume is shown. Default: all.
+    pub clip: Option<ClipRequest>,
     /// When to stop: whichever is reached first. Default: the technique's own number of samples.
     pub budget: Option<BudgetRequest>,
     /// Keys every random number of the render.
@@ -86,6 +88,44 @@ pub struct ImageRequest {
     /// Pixels down. Default 512.
     #[schemars(range(min = 1, max = 4096))]
     pub height: Option<u32>,
+    /// Linear red, green, blue behind the volume. Default black.
+    #[schemars(inner(range(min = 0, max = 1)))]
+    pub background: Option<[f64; 3]>,
+    /// Leave out the background: a PNG with alpha.
+    pub transparent: Option<bool>,
+}
+
+/// Clipping planes and a crop box: only what is inside of all of them is shown.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ClipRequest {
+    /// Planes in world units.
+    #[schemars(length(max = 8))]
+    pub planes: Option<Vec<PlaneRequest>>,
+    /// A box along the world's axes.
+    #[serde(rename = "box")]
+    pub crop: Option<BoxRequest>,
+}
+
+/// A plane: the side that its normal points to is shown.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PlaneRequest {
+    /// Towards what is shown, of any length.
+    pub normal: [f64; 3],
+    /// A point of the plane. Default: the volume's centre.
+    #[serde(default)]
+    pub point: [f64; 3],
+}
+
+/// A box along the world's axes, in world units.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BoxRequest {
+    /// Its least corner.
+    pub min: [f64; 3],
+    /// Its greatest corner.
+    pub max: [f64; 3],
 }
 
 /// When to stop.

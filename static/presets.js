@@ -1,5 +1,5 @@
 // The server's transfer function presets as points, so that they can be seen over the histogram and an edit can start
-// from them. The same numbers as src/scene/transfer.rs, which is what renders; no DOM.
+// from them. The same numbers as src/scene/presets.rs, which is what renders; no DOM.
 
 import { colorOf } from './curve.js';
 
@@ -18,6 +18,17 @@ const CT_BONE = [
 /** Places in Hounsfield units. */
 const CT_BONE_HOUNSFIELD = [
   [-1000, '#000000', 0], [120, '#6a2a1c', 0], [220, '#b07850', 0.2], [450, '#e0c8a0', 1.5], [1000, '#f6eedc', 4], [2000, '#ffffff', 6],
+];
+
+const BONE_FLESH = [
+  [0, '#000000', 0], [0.18, '#c07860', 0], [0.22, '#d08870', 0.12], [0.4, '#d08870', 0.12], [0.46, '#f6eedc', 5], [1, '#ffffff', 8],
+];
+/** Places in Hounsfield units. */
+const BONE_FLESH_HOUNSFIELD = [
+  [-1000, '#000000', 0], [-200, '#c07860', 0], [-50, '#d08870', 0.12], [150, '#d08870', 0.12], [250, '#f6eedc', 5], [2000, '#ffffff', 8],
+];
+const BLUE_YELLOW = [
+  [0, '#2040ff', 0], [0.12, '#2040ff', 0], [0.16, '#2040ff', 0.2], [0.44, '#2040ff', 0.2], [0.5, '#ffe020', 8], [1, '#ffe020', 8],
 ];
 
 const isHounsfield = ([low, high]) => low <= -500 && high >= 600;
@@ -42,10 +53,11 @@ export function presetPoints(name, { range: [low, high], meanSide }, { rotation 
     return Array.from({ length: HLS_POINTS + 1 }, (_, i) => i / HLS_POINTS)
       .map((v) => point(v * (high > 0 ? high : 1), colorOf(hue(v + rotation)), v ** exponent));
   }
-  if (name === 'ct_bone' && isHounsfield([low, high])) {
-    return CT_BONE_HOUNSFIELD.map(([value, color, opacity]) => point(value, colorOf(color), opacity));
+  const absolute = { ct_bone: CT_BONE_HOUNSFIELD, bone_flesh: BONE_FLESH_HOUNSFIELD }[name];
+  if (absolute && isHounsfield([low, high])) {
+    return absolute.map(([value, color, opacity]) => point(value, colorOf(color), opacity));
   }
-  const shape = { mri_head: MRI_HEAD, ct_bone: CT_BONE }[name] ?? RAMP;
+  const shape = { mri_head: MRI_HEAD, ct_bone: CT_BONE, bone_flesh: BONE_FLESH, blue_yellow: BLUE_YELLOW }[name] ?? RAMP;
   return shape.map(([place, color, opacity]) => point(low + (high - low || 1) * place, colorOf(color), opacity));
 }
 

@@ -3,11 +3,14 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test says what is wrong by panicking")]
 
+#[path = "device/cells.rs"]
+mod cells;
 mod common;
 
 use std::path::Path;
 use std::process::Command;
 
+use cloudchamber::device::cells::CellsPass;
 use cloudchamber::device::program::{Source, Variant};
 use cloudchamber::device::structs::{DeviceStruct, View};
 use cloudchamber::device::{self, Device, DeviceConfig};
@@ -56,6 +59,7 @@ fn same_on_both_sides<T: DeviceStruct>() {
 #[test]
 fn structs_lie_the_same_on_host_and_device() {
     same_on_both_sides::<View>();
+    same_on_both_sides::<CellsPass>();
     same_on_both_sides::<EmissionAbsorption>();
     same_on_both_sides::<FieldPass>();
     same_on_both_sides::<PhotonTransport>();
@@ -141,11 +145,14 @@ fn oclgrind_would_see_a_stray_store() {
         let broken = text.replace("film[4 * pixels + pixel] = m2;", "film[5 * pixels + pixel] = m2;");
         std::fs::write(folder.path().join(name), broken).unwrap();
     };
-    for name in ["lanes.h", "rng.h", "camera.h", "volume.h", "film.h"] {
-        copy(&format!("shared/{name}"));
+    let kernels = Path::new(env!("CARGO_MANIFEST_DIR")).join("kernels");
+    for sub in ["", "shared"] {
+        for file in std::fs::read_dir(kernels.join(sub)).unwrap().map(|entry| entry.unwrap().path()) {
+            if file.is_file() {
+                copy(&Path::new(sub).join(file.file_name().unwrap()).to_string_lossy());
+            }
+        }
     }
-    copy("emission_absorption.cl");
-    copy("photon_transport.cl");
     let log = oclgrind(VIEW, "1", Some(folder.path()));
     assert!(log.contains("Invalid write"), "the log is: {log}");
 }

@@ -121,8 +121,10 @@ fn table(text: &str, name: &str) -> Vec<String> {
 #[test]
 fn the_viewers_presets_are_the_servers() {
     let read = |file: &str| std::fs::read_to_string(root().join(file)).unwrap();
-    let (server, viewer) = (read("src/scene/transfer.rs"), read("static/presets.js"));
-    for name in ["RAMP", "MRI_HEAD", "CT_BONE", "CT_BONE_HOUNSFIELD"] {
+    let (server, viewer) = (read("src/scene/presets.rs"), read("static/presets.js"));
+    for name in
+        ["RAMP", "MRI_HEAD", "CT_BONE", "CT_BONE_HOUNSFIELD", "BONE_FLESH", "BONE_FLESH_HOUNSFIELD", "BLUE_YELLOW"]
+    {
         let (ours, theirs) = (table(&server, name), table(&viewer, name));
         assert!(ours.len() >= 9 && ours == theirs, "{name}: {ours:?} in the server, {theirs:?} in the viewer");
     }

@@ -109,7 +109,11 @@ static inline int beam_leap(constant const View *view, const Beam *b, global con
         cell[i] = clamp((int)(here[i] * (1.0f / CELL)), 0, count[i] - 1);
     }
     int distance = distances[(cell[2] * count[1] + cell[1]) * count[0] + cell[0]];
-    if (distance == 0) return 0;
+#if TAPS == 4 || STYLED
+    // A cubic reads a voxel further than the cells look.
+    distance -= 1;
+#endif
+    if (distance <= 0) return 0;
     for (int i = 0; i < 3; i++) {
         // The block of empty cells; beyond the box there is nothing either.
         int first = cell[i] - distance + 1, last = cell[i] + distance;

@@ -20,6 +20,8 @@ device_struct! {
         pub axis: i32,
         /// How many intervals of values make a cell occupied.
         pub intervals: i32,
+        /// How far beyond a cell's range an interpolant may go, as a part of it.
+        pub overshoot: f32,
     }
 }
 
@@ -67,7 +69,7 @@ impl Cells {
         device.build(&build, &kernel)?;
         let [wide, high, deep] = voxel_dims.map(|n| n.div_ceil(CELL));
         let ranges = device.allocate(2 * voxel.bytes() * wide * high * deep)?;
-        let pass = device.upload(bytemuck::bytes_of(&pass(voxel_dims, 0, 0)), 0)?;
+        let pass = device.upload(bytemuck::bytes_of(&pass(voxel_dims, 0, 0, 0.0)), 0)?;
         device.run(&kernel, &[&pass, voxels, &ranges], high * deep)?;
         Ok(Self { ranges, voxel_dims, voxel })
     }
@@ -78,11 +80,11 @@ impl Cells {
     }
 
     /// For each cell, x fastest, the Chebyshev distance in cells to the nearest one whose range meets one of `intervals` (raw
-    /// values): 0 in such a cell itself, 255 for 255 or more. In a cell of distance `d` nothing is within `d − 1` cells.
+    /// values), widened by the part `overshoot` of itself: 0 in such a cell itself, 255 for 255 or more. In a cell of distance `d` nothing is within `d − 1` cells.
     ///
     /// # Errors
     /// As [`Cells::new`].
-    pub fn distances(&self, device: &mut Device, intervals: &[[f32; 2]]) -> Result<Buffer> {
+    pub fn distances(&self, device: &mut Device, intervals: &[[f32; 2]], overshoot: f32) -> Result<Buffer> {
         let [_, source] = sources();
         let kernel = variant("distances", self.voxel);
         device.build(&source, &kernel)?;
@@ -90,13 +92,14 @@ impl Cells {
         let (a, b) = (device.allocate(wide * high * deep)?, device.allocate(wide * high * deep)?);
         let wanted = device.upload(bytemuck::cast_slice(intervals), 8)?;
         for (axis, lines, from, to) in [(0, high * deep, &b, &a), (1, wide * deep, &a, &b), (2, wide * high, &b, &a)] {
-            let pass = device.upload(bytemuck::bytes_of(&pass(self.voxel_dims, axis, intervals.len())), 0)?;
+            let pass =
+                device.upload(bytemuck::bytes_of(&pass(self.voxel_dims, axis, intervals.len(), overshoot)), 0)?;
             device.run(&kernel, &[&pass, &wanted, &self.ranges, from, to], lines)?;
         }
         Ok(a)
     }
 }
 
-fn pass(voxel_dims: [usize; 3], axis: i32, intervals: usize) -> CellsPass {
-    CellsPass { dims: voxel_dims.map(|n| n as i32), axis, intervals: intervals as i32 }
+fn pass(voxel_dims: [usize; 3], axis: i32, intervals: usize, overshoot: f32) -> CellsPass {
+    CellsPass { dims: voxel_dims.map(|n| n as i32), axis, intervals: intervals as i32, overshoot }
 }

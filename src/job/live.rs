@@ -16,6 +16,7 @@ use crate::device::program::{Source, Variant};
 use crate::device::{Buffer, Device};
 use crate::error::{Error, Result};
 use crate::film::Film;
+use crate::film::picture::Background;
 use crate::scene::{Scene, Subject};
 use crate::technique;
 use crate::volume::Volume;
@@ -219,7 +220,7 @@ impl Live {
             progress.reasons = self.field.as_ref().map_or(Vec::new(), |f| f.reasons().to_vec());
             progress.reasons.extend_from_slice(&view.plan().reasons);
             progress.counts.non_finite_voxels = volume.non_finite();
-            progress.warnings = warnings(&volume);
+            progress.warnings = warnings(&volume, scene);
             if self.field.is_some() {
                 progress.field = Some(volume.clone());
             }
@@ -348,7 +349,8 @@ impl Live {
 
     fn snapshot(&mut self, context: &DeviceContext, stopped_by: Option<&'static str>) -> Result<()> {
         let Some(view) = &self.view else { return Ok(()) };
-        let film = Film { field_error: self.field_error, ..view.film(context)? };
+        let background = self.scene.as_ref().map_or(Background::default(), Scene::background);
+        let film = Film { field_error: self.field_error, background, ..view.film(context)? };
         let device_time = view.device_time + self.field.as_ref().map_or(Duration::ZERO, |f| f.device_time);
         let snapshot = Snapshot {
             film: Arc::new(film),
@@ -366,7 +368,7 @@ impl Live {
 }
 
 /// What a reader should know of the volume, in codes and words.
-fn warnings(volume: &Volume) -> Vec<Value> {
+fn warnings(volume: &Volume, scene: &Scene) -> Vec<Value> {
     let mut warnings: Vec<Value> =
         volume.notes().iter().map(|n| json!({"code": "volume_note", "message": n})).collect();
     if volume.non_finite() > 0 {
@@ -377,6 +379,10 @@ fn warnings(volume: &Volume) -> Vec<Value> {
         warnings.push(
             json!({"code": "non_finite_voxels", "message": message, "measured": volume.non_finite(), "bound": 0}),
         );
+    }
+    if scene.clip().removes_all(volume) {
+        let message = "the clipping planes leave nothing of the volume";
+        warnings.push(json!({"code": "clipped_away", "message": message}));
     }
     warnings
 }

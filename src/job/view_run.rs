@@ -127,6 +127,7 @@ impl ViewRun {
         let mut view = scene.camera().device_view(scene.image(), volume);
         view.full_width = scene.image()[0] as i32;
         view.seed = [scene.seed() as u32, (scene.seed() >> 32) as u32];
+        scene.clip().apply(volume, &mut view);
         scene.view().look(scene.camera(), &mut view);
         view
     }
@@ -254,7 +255,7 @@ impl ViewRun {
         let shown = if main.samples > 0 { main } else { control };
         let control = (shown.stride == 1 && control.samples > 0).then(|| read(control)).transpose()?;
         let opacity_threshold = self.plan.opacity_threshold;
-        Ok(Film { size: self.size, main: read(shown)?, control, opacity_threshold, field_error: None })
+        Ok(Film { size: self.size, main: read(shown)?, control, opacity_threshold, ..Film::default() })
     }
 
     /// Samples that were not finite.
@@ -283,7 +284,9 @@ fn distances(
             [ends[0].next_down(), ends[1].next_up()]
         })
         .collect();
-    let distances = on_device.cells.distances(&mut context.device, &intervals)?;
+    // Catmull-Rom's weights sum to 1 and their magnitudes to at most 1.25 along an axis: (1.25³ − 1) / 2 of the range.
+    let overshoot = if plan.variant.features.contains(&("INTERPOLATION", 3)) { 0.477 } else { 0.0 };
+    let distances = on_device.cells.distances(&mut context.device, &intervals, overshoot)?;
     let mut bytes = vec![0u8; wide * high * deep];
     context.device.read(&distances, 0, &mut bytes)?;
     let empty = bytes.iter().filter(|d| **d > 0).count();

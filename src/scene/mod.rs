@@ -1,7 +1,10 @@
 //! The validated scene. Fields are private: what a `Scene` holds has been checked, and nothing downstream checks again.
 
 pub mod camera;
+pub mod clip;
+pub mod interpolation;
 pub mod light;
+pub mod presets;
 pub mod transfer;
 
 use std::sync::Arc;
@@ -11,10 +14,12 @@ use serde_json::Value;
 
 use crate::config::Limits;
 use crate::error::{Error, Result};
-use crate::request::{self, BudgetRequest, CameraRequest, RenderRequest, VolumeRequest};
+use crate::film::picture::Background;
+use crate::request::{self, BudgetRequest, CameraRequest, ImageRequest, RenderRequest, VolumeRequest};
 use crate::technique::{self, Field, Technique, View};
 use crate::volume::{Store, Volume};
 use camera::{Camera, Framing};
+use clip::Clip;
 
 /// Pixels a side when the request is silent.
 const DEFAULT_SIDE: u32 = 512;
@@ -49,7 +54,9 @@ pub struct Scene {
     subject: Subject,
     framing: Framing,
     camera: Camera,
+    clip: Clip,
     image: [u32; 2],
+    background: Background,
     budget: Budget,
     seed: u64,
 }
@@ -120,10 +127,23 @@ impl Scene {
         let view = parse(request.parameters.get(technique.name).unwrap_or(&empty), &format!("/{}", technique.name))?;
         let (subject, framing) = subject(request.volume.as_ref(), store, limits)?;
         let camera = Camera::from_request(request.camera.as_ref(), &framing)?;
+        let clip = Clip::from_request(request.clip.as_ref())?;
         let image = request.image.unwrap_or_default();
+        let background = background(&image)?;
         let image = [image.width.unwrap_or(DEFAULT_SIDE), image.height.unwrap_or(DEFAULT_SIDE)];
         let budget = budget(&request.budget.unwrap_or_default(), limits);
-        let scene = Self { technique, view, subject, framing, camera, image, budget, seed: request.seed.unwrap_or(0) };
+        let scene = Self {
+            technique,
+            view,
+            subject,
+            framing,
+            camera,
+            clip,
+            image,
+            background,
+            budget,
+            seed: request.seed.unwrap_or(0),
+        };
         if let Subject::Volume(volume) = &scene.subject {
             scene.view.plan(volume)?;
         }
@@ -160,6 +180,14 @@ impl Scene {
     pub fn camera(&self) -> &Camera {
         &self.camera
     }
+    /// What of the volume is shown.
+    pub fn clip(&self) -> &Clip {
+        &self.clip
+    }
+    /// What is behind the volume.
+    pub fn background(&self) -> Background {
+        self.background
+    }
     /// Width and height in pixels.
     pub fn image(&self) -> [u32; 2] {
         self.image
@@ -171,6 +199,18 @@ impl Scene {
     /// The seed of every random number.
     pub fn seed(&self) -> u64 {
         self.seed
+    }
+}
+
+fn background(image: &ImageRequest) -> Result<Background> {
+    match (image.background, image.transparent) {
+        (Some(_), Some(true)) => Err(Error::invalid(
+            "/image/background",
+            "the picture is to be transparent",
+            "one of background and transparent",
+        )),
+        (_, Some(true)) => Ok(Background::Transparent),
+        (color, _) => Ok(Background::Colour(color.unwrap_or_default().map(|c| c as f32))),
     }
 }
 

@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::presets;
 use crate::error::{Error, Result, Violation};
 use crate::volume::Volume;
 
@@ -15,8 +16,10 @@ const PRESET_OPTICAL_DEPTH: f64 = 24.0;
 #[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TransferRequest {
-    /// `ramp`, `hls` (hue by value, opacity by power), `ct_bone` or `mri_head`. Default: what suits the volume.
-    #[schemars(extend("enum" = ["ramp", "hls", "ct_bone", "mri_head"]))]
+    /// `ramp`, `hls` (hue by value, opacity by power), `ct_bone`, `mri_head`, `bone_flesh` (ivory bone in translucent flesh),
+    /// `blue_yellow` (blue and transparent, then yellow and opaque) or `labels` (a colour a whole number, 0 is empty). Default: what
+    /// suits the volume.
+    #[schemars(extend("enum" = ["ramp", "hls", "ct_bone", "mri_head", "bone_flesh", "blue_yellow", "labels"]))]
     pub preset: Option<String>,
     /// `hls`: turns the hue, in turns.
     #[schemars(range(min = 0, max = 1))]
@@ -29,6 +32,31 @@ pub struct TransferRequest {
     /// Control points in rising order of value, linear between them, constant outside. Instead of a preset.
     #[schemars(length(min = 1, max = 256))]
     pub points: Option<Vec<ControlPoint>>,
+    /// The colours of a label volume, whose voxels are whole numbers. Instead of a preset.
+    #[schemars(length(min = 1, max = 4096))]
+    pub labels: Option<Vec<Label>>,
+}
+
+impl TransferRequest {
+    /// Whether it asks for a label volume's colours.
+    pub fn is_labels(&self) -> bool {
+        self.labels.is_some() || self.preset.as_deref() == Some("labels")
+    }
+}
+
+/// The look of one label.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Label {
+    /// The voxels' value.
+    #[schemars(range(min = 0, max = 4095))]
+    pub label: u32,
+    /// Linear red, green, blue. Default: one of its own.
+    #[schemars(inner(range(min = 0, max = 1)))]
+    pub color: Option<[f64; 3]>,
+    /// Extinction per world unit.
+    #[schemars(range(min = 0, max = 1e6))]
+    pub opacity_per_unit: f64,
 }
 
 /// One control point.
@@ -61,54 +89,8 @@ pub enum TransferFunction {
         /// Opacity per world unit at full opacity.
         opacity_per_unit: f64,
     },
-}
-
-/// sRGB's decoding (IEC 61966-2-1), for colours that are chosen by eye.
-fn linear(srgb: f64) -> f64 {
-    if srgb <= 0.04045 { srgb / 12.92 } else { ((srgb + 0.055) / 1.055).powf(2.4) }
-}
-
-fn by_eye(value: f64, rgb: u32, opacity_per_unit: f64) -> ControlPoint {
-    let channel = |shift: u32| linear(f64::from(rgb >> shift & 0xff) / 255.0);
-    ControlPoint { value, color: [channel(16), channel(8), channel(0)], opacity_per_unit }
-}
-
-/// A preset's points: (place, colour, opacity from 0 to 1). Places are fractions of the value range.
-type PresetPoints = &'static [(f64, u32, f64)];
-
-const RAMP: PresetPoints = &[(0.0, 0x1a1a80, 0.0), (0.5, 0xe08040, 0.5), (1.0, 0xfff8e0, 1.0)];
-/// Air, skin, muscle and fluid, grey matter, white matter and fat of a T1 head.
-const MRI_HEAD: PresetPoints = &[
-    (0.0, 0x000000, 0.0),
-    (0.13, 0x5a2e22, 0.0),
-    (0.22, 0xb0694a, 0.4),
-    (0.34, 0xc98f70, 0.64),
-    (0.50, 0xd8b49a, 1.6),
-    (0.65, 0xf0dcc8, 4.0),
-    (1.0, 0xffffff, 8.0),
-];
-/// Bone of a CT whose values are not Hounsfield units.
-const CT_BONE: PresetPoints = &[
-    (0.0, 0x000000, 0.0),
-    (0.30, 0x6a2a1c, 0.0),
-    (0.42, 0xa8583c, 0.06),
-    (0.55, 0xd8b890, 0.9),
-    (0.75, 0xf4ead2, 3.0),
-    (1.0, 0xffffff, 6.0),
-];
-/// The same in Hounsfield units: bone starts at about 200, dense bone at 700.
-const CT_BONE_HOUNSFIELD: PresetPoints = &[
-    (-1000.0, 0x000000, 0.0),
-    (120.0, 0x6a2a1c, 0.0),
-    (220.0, 0xb07850, 0.2),
-    (450.0, 0xe0c8a0, 1.5),
-    (1000.0, 0xf6eedc, 4.0),
-    (2000.0, 0xffffff, 6.0),
-];
-
-/// Whether a range of values looks like Hounsfield units: air far below 0 and bone far above.
-fn is_hounsfield(range: [f64; 2]) -> bool {
-    range[0] <= -500.0 && range[1] >= 600.0
+    /// A colour and an opacity per world unit for each whole number from 0; nothing for others.
+    Labels(Vec<([f64; 3], f64)>),
 }
 
 /// The values that a preset spans. A field's brightest voxels stand next to its source and would leave the rest dark.
@@ -143,12 +125,20 @@ impl TransferFunction {
     /// [`Error::Invalid`] naming the field.
     pub fn from_request(request: &TransferRequest, volume: &Volume, at: &str) -> Result<(Self, String)> {
         if let Some(points) = &request.points {
-            if request.preset.is_some() {
-                return Err(Error::invalid(format!("{at}/points"), "given beside preset", "either points or preset"));
+            if request.preset.is_some() || request.labels.is_some() {
+                let given = "given beside preset or labels";
+                return Err(Error::invalid(format!("{at}/points"), given, "one of points, labels and preset"));
             }
             return Self::from_points(points, at).map(|f| (f, format!("{} control points", points.len())));
         }
-        let suits = match (volume.format(), is_hounsfield(volume.range())) {
+        if let Some(labels) = &request.labels {
+            if request.preset.is_some() {
+                let given = "given beside preset";
+                return Err(Error::invalid(format!("{at}/labels"), given, "one of points, labels and preset"));
+            }
+            return Self::from_labels(labels, at).map(|f| (f, format!("{} labels", labels.len())));
+        }
+        let suits = match (volume.format(), presets::is_hounsfield(volume.range())) {
             ("builtin" | "field", _) => "ramp",
             (_, true) => "ct_bone",
             (_, false) => "mri_head",
@@ -163,10 +153,8 @@ impl TransferFunction {
                 value_max: range[1],
                 opacity_per_unit: full,
             },
-            "ct_bone" if is_hounsfield(range) => Self::from_preset(CT_BONE_HOUNSFIELD, [0.0, 1.0], full),
-            "ct_bone" => Self::from_preset(CT_BONE, range, full),
-            "mri_head" => Self::from_preset(MRI_HEAD, range, full),
-            _ => Self::from_preset(RAMP, range, full),
+            "labels" => Self::Labels(presets::labels(volume.range()[1], full)),
+            name => Self::Points(presets::points(name, range, full)),
         };
         Ok((function, format!("the preset {preset}")))
     }
@@ -182,9 +170,17 @@ impl TransferFunction {
         if wrong.is_empty() { Ok(Self::Points(points.to_vec())) } else { Err(Error::Invalid(wrong)) }
     }
 
-    fn from_preset(points: PresetPoints, [low, high]: [f64; 2], full: f64) -> Self {
-        let place = |f: f64| low + (high - low) * f;
-        Self::Points(points.iter().map(|&(f, rgb, opacity)| by_eye(place(f), rgb, opacity * full)).collect())
+    fn from_labels(labels: &[Label], at: &str) -> Result<Self> {
+        let most = labels.iter().map(|l| l.label).max().unwrap_or(0) as usize;
+        let mut table = vec![([0.0; 3], 0.0); most + 1];
+        for (i, label) in labels.iter().enumerate() {
+            if labels[..i].iter().any(|other| other.label == label.label) {
+                return Err(Error::invalid(format!("{at}/labels/{i}/label"), "given twice", "each label once"));
+            }
+            let color = label.color.unwrap_or_else(|| presets::label_color(label.label));
+            table[label.label as usize] = (color, label.opacity_per_unit);
+        }
+        Ok(Self::Labels(table))
     }
 
     /// The values between which the function changes: what a table of it has to cover.
@@ -192,6 +188,7 @@ impl TransferFunction {
         let [low, high] = match self {
             Self::Points(points) => [points.first(), points.last()].map(|p| p.map_or(0.0, |p| p.value)),
             Self::Hls { value_max, .. } => [0.0, *value_max],
+            Self::Labels(_) => [0.0, (TABLE_SIZE - 1) as f64],
         };
         if high > low { [low, high] } else { [low, low + 1.0] }
     }
@@ -200,11 +197,33 @@ impl TransferFunction {
     pub fn evaluate(&self, value: f64) -> ([f64; 3], f64) {
         match self {
             Self::Points(points) => evaluate_points(points, value),
+            Self::Labels(table) => table.get(value.round().max(0.0) as usize).copied().unwrap_or_default(),
             Self::Hls { rotation, exponent, value_max, opacity_per_unit } => {
                 let v = if *value_max > 0.0 { (value / value_max).clamp(0.0, 1.0) } else { 0.0 };
-                (hue((v + rotation).fract()), v.powf(*exponent) * opacity_per_unit)
+                (presets::hue((v + rotation).fract()), v.powf(*exponent) * opacity_per_unit)
             }
         }
+    }
+
+    /// The device's table for pre-integrated steps: for each entry the integrals from the first of extinction and of extinction
+    /// times red, green and blue over the entries, then the integrands, all as floats.
+    pub fn integrals(&self, opacity_scale: f64) -> Vec<u32> {
+        let [low, high] = self.domain();
+        let integrand = |i: usize| {
+            let (c, sigma) = self.evaluate(low + (high - low) * i as f64 / (TABLE_SIZE - 1) as f64);
+            [1.0, c[0], c[1], c[2]].map(|part| part * sigma * opacity_scale)
+        };
+        let (mut sum, mut before) = ([0.0; 4], integrand(0));
+        let mut table = Vec::with_capacity(8 * TABLE_SIZE);
+        for i in 0..TABLE_SIZE {
+            let here = integrand(i);
+            for part in 0..4 {
+                sum[part] += if i == 0 { 0.0 } else { 0.5 * (before[part] + here[part]) };
+            }
+            before = here;
+            table.extend(sum.iter().chain(&here).map(|v| (*v as f32).to_bits()));
+        }
+        table
     }
 
     /// The intervals of values that the device's table gives any opacity, in rising order.
@@ -242,7 +261,7 @@ impl TransferFunction {
 
 /// A colour and an opacity in two words: the float of the opacity, rounded to 13 bits after the point, and in its ten lowest and
 /// two highest bits the square root of blue; then red and green.
-fn pack(color: [f64; 3], opacity: f64) -> [u32; 2] {
+pub(crate) fn pack(color: [f64; 3], opacity: f64) -> [u32; 2] {
     let bits = |c: f64, most: f64| (c.clamp(0.0, 1.0) * most).round() as u32;
     let root = bits(color[2].max(0.0).sqrt(), 4095.0);
     let opacity = ((opacity.clamp(0.0, 1.0) as f32).to_bits() + 0x200) & 0x3fff_fc00;
@@ -260,17 +279,9 @@ fn evaluate_points(points: &[ControlPoint], value: f64) -> ([f64; 3], f64) {
     (std::array::from_fn(|c| mix(a.color[c], b.color[c])), mix(a.opacity_per_unit, b.opacity_per_unit))
 }
 
-/// HLS(turn 360, 0.5, 1) as linear RGB: lightness a half and saturation 1 are the pure hues.
-fn hue(turn: f64) -> [f64; 3] {
-    let channel = |shift: f64| {
-        let t = (turn + shift).rem_euclid(1.0) * 6.0;
-        linear(((t - 3.0).abs() - 1.0).clamp(0.0, 1.0))
-    };
-    [channel(0.0), channel(-1.0 / 3.0), channel(-2.0 / 3.0)]
-}
-
 #[cfg(test)]
 mod tests {
+    use super::presets::hue;
     use super::*;
 
     fn point(value: f64, grey: f64, opacity_per_unit: f64) -> ControlPoint {

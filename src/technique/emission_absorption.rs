@@ -11,16 +11,27 @@
 //!
 //! | parameter | unit | range | default |
 //! |---|---|---|---|
-//! | `transfer_function` | | a preset or points | what suits the volume |
+//! | `transfer_function` | | a preset, points or labels | what suits the volume |
+//! | `regions` | | value × gradient magnitude, instead | |
+//! | `cuda_sample` | | the CUDA sample `volumeRender`'s parameters, instead | |
 //! | `opacity_scale` | | 0–10⁴ | 1 |
 //! | `step_voxels` | smallest voxel side | 0.05–16 | 1 |
 //! | `opacity_threshold` | opacity | 0.5–1 | 0.999 |
+//! | `interpolation` | | `nearest`, `trilinear`, `b_spline`, `catmull_rom` | `trilinear`; `nearest` for labels |
+//! | `pre_integrated` | | second order in the step | false |
+//! | `brightness` | | 0–100 | 1 |
 //! | `shading` | | | false |
 //! | `light` | | direction and Blinn-Phong weights | a headlight |
+//! | `gradient_opacity`, `silhouette` | | opacity by gradient magnitude and angle | |
+//! | `curvature`, `tone`, `translucency` | | colour and light beyond Blinn-Phong | |
 //! | `order` | | `front_to_back`, `back_to_front` | `front_to_back` |
 //! | `empty_space_skipping` | | | true |
 //!
 //! Example: see [`example`], which a test runs.
+
+pub mod plan;
+pub mod regions;
+pub mod style;
 
 use std::sync::Arc;
 
@@ -28,16 +39,15 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::{Kind, Technique, View, ViewPlan};
-use crate::device::program::{Source, Variant};
-use crate::device::structs::{DeviceStruct, View as DeviceView};
+use super::{Kind, Technique, View};
 use crate::device_struct;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::request;
-use crate::scene::camera::Camera;
+use crate::scene::interpolation::Interpolation;
 use crate::scene::light::LightRequest;
-use crate::scene::transfer::{TABLE_SIZE, TransferFunction, TransferRequest};
-use crate::volume::{Volume, VoxelType};
+use crate::scene::transfer::TransferRequest;
+use regions::Region;
+use style::{CurvatureStyle, GradientOpacity, Silhouette, Styles, Tone, Translucency};
 
 /// The technique's line in the list.
 pub const TECHNIQUE: Technique = Technique {
@@ -45,7 +55,7 @@ pub const TECHNIQUE: Technique = Technique {
     summary: "Alpha-blended ray casting through a transfer function, front to back with early termination",
     schema: request::schema_of::<Parameters>,
     example,
-    source,
+    source: plan::source,
     kind: Kind::View(parse),
 };
 
@@ -58,6 +68,38 @@ device_struct! {
         pub table_offset: f32,
         /// A ray ends when less than this gets through.
         pub transmittance_floor: f32,
+        /// Multiplies the picture.
+        pub brightness: f32,
+        /// Row of a two-dimensional table = gradient magnitude (raw values per world unit) × this; 0 for a table of values only.
+        pub gradient_scale: f32,
+        /// Extinction is times the gradient magnitude times this; 0 for off.
+        pub gradient_gain: f32,
+        /// Extinction is times base + gain (1 − |n·v|)^exponent; a gain of 0 for off.
+        pub silhouette_base: f32,
+        /// See `silhouette_base`.
+        pub silhouette_gain: f32,
+        /// See `silhouette_base`.
+        pub silhouette_exponent: f32,
+        /// Curvature of full colour, per world unit; 0 for off.
+        pub curvature_full: f32,
+        /// Colour of ridges.
+        pub ridge: [f32; 3],
+        /// Colour of valleys.
+        pub valley: [f32; 3],
+        /// Width of contours, world units.
+        pub contour_width: f32,
+        /// Whether cool-to-warm shading replaces the light's.
+        pub toned: i32,
+        /// Colour away from the light.
+        pub cool: [f32; 3],
+        /// Colour towards the light.
+        pub warm: [f32; 3],
+        /// The part of the light that goes through a surface; 0 for off.
+        pub translucency: f32,
+        /// Exponent of its lobe.
+        pub translucency_exponent: f32,
+        /// Whether a styled sample is lit.
+        pub lit: i32,
     }
 }
 
@@ -67,6 +109,30 @@ device_struct! {
 pub struct Parameters {
     /// Value to colour and opacity per unit length.
     transfer_function: Option<TransferRequest>,
+    /// Instead of `transfer_function`: regions of value and gradient magnitude.
+    #[schemars(length(min = 1, max = 16))]
+    regions: Option<Vec<Region>>,
+    /// Instead of `transfer_function`: the parameters of NVIDIA's CUDA sample `volumeRender`, with its nine colours.
+    cuda_sample: Option<CudaSample>,
+    /// How values lie between voxels. Default: `trilinear`, for labels `nearest`.
+    interpolation: Option<Interpolation>,
+    /// Take the transfer function as integrated between the ends of each step: second order in the step instead of first.
+    #[serde(default)]
+    pre_integrated: bool,
+    /// Multiplies the picture.
+    #[serde(default = "one")]
+    #[schemars(range(min = 0, max = 100))]
+    brightness: f64,
+    /// Opacity times gradient magnitude.
+    gradient_opacity: Option<GradientOpacity>,
+    /// Opacity by how the surface is turned.
+    silhouette: Option<Silhouette>,
+    /// Colour by curvature.
+    curvature: Option<CurvatureStyle>,
+    /// Cool-to-warm shading.
+    tone: Option<Tone>,
+    /// Light through thin tissue.
+    translucency: Option<Translucency>,
     /// Multiplies every opacity.
     #[serde(default = "one")]
     #[schemars(range(min = 0, max = 10_000))]
@@ -93,6 +159,42 @@ pub struct Parameters {
     empty_space_skipping: bool,
 }
 
+/// The parameters of NVIDIA's CUDA sample `volumeRender`, under its names but for `linear`, which it calls linear filtering.
+/// Values of bytes are taken as 0 to 255, others over the volume's range; its box from −1 to 1 is the volume's longest side.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CudaSample {
+    /// Multiplies the table's alpha, which stands for a step of 0.01.
+    #[serde(default = "default_density")]
+    #[schemars(range(min = 0, max = 1))]
+    density: f64,
+    /// Multiplies the picture.
+    #[serde(default = "one")]
+    #[schemars(range(min = 0, max = 100))]
+    brightness: f64,
+    /// Taken off a value before the table.
+    #[serde(default)]
+    #[schemars(range(min = -1, max = 1))]
+    transfer_offset: f64,
+    /// Multiplies a value before the table.
+    #[serde(default = "one")]
+    #[schemars(range(min = 0.01, max = 100))]
+    transfer_scale: f64,
+    /// A ray ends at this opacity.
+    #[serde(default = "default_sample_threshold")]
+    #[schemars(range(min = 0.5, max = 1))]
+    opacity_threshold: f64,
+    /// Whether values are interpolated between voxels.
+    #[serde(default = "yes")]
+    linear: bool,
+}
+
+fn default_density() -> f64 {
+    0.05
+}
+fn default_sample_threshold() -> f64 {
+    0.95
+}
 fn one() -> f64 {
     1.0
 }
@@ -116,86 +218,76 @@ pub fn example() -> Value {
     })
 }
 
-const FEATURES: [&[(&str, i32)]; 4] = [
-    &[("SHADED", 0), ("BACK_TO_FRONT", 0)],
-    &[("SHADED", 1), ("BACK_TO_FRONT", 0)],
-    &[("SHADED", 0), ("BACK_TO_FRONT", 1)],
-    &[("SHADED", 1), ("BACK_TO_FRONT", 1)],
-];
-
-fn source() -> Source {
-    Source {
-        kernel: TECHNIQUE.name,
-        headers: super::VIEW_HEADERS,
-        structs: || DeviceView::opencl_text() + &EmissionAbsorption::opencl_text(),
-        arguments: 7,
-        variants: || {
-            let types = [VoxelType::U8, VoxelType::I16, VoxelType::U16, VoxelType::F32];
-            types.into_iter().flat_map(|t| FEATURES.iter().map(move |f| variant(t, f))).collect()
-        },
-        common: usize::MAX,
-    }
-}
-
-fn variant(voxel: VoxelType, features: &'static [(&'static str, i32)]) -> Variant {
-    Variant { kernel: TECHNIQUE.name, voxel: Some(voxel), features }
-}
-
 fn parse(parameters: &Value, at: &str) -> Result<Arc<dyn View>> {
     let parameters: Parameters = request::parse(parameters, &(TECHNIQUE.schema)(), at)?;
     if let Some(light) = &parameters.light {
         light.check(&format!("{at}/light"))?;
     }
+    if let Some(regions) = &parameters.regions {
+        regions::check(regions, &format!("{at}/regions"))?;
+    }
+    parameters.check_together(at)?;
     Ok(Arc::new(parameters))
 }
 
 impl Parameters {
-    fn transfer_function(&self, volume: &Volume) -> Result<(TransferFunction, String)> {
-        let request = self.transfer_function.clone().unwrap_or_default();
-        TransferFunction::from_request(&request, volume, "/emission_absorption/transfer_function")
-    }
-}
-
-impl View for Parameters {
-    fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
-        let (function, named) = self.transfer_function(volume)?;
-        let skip = self.empty_space_skipping && self.order == "front_to_back";
-        let mut reasons = vec![format!("transfer function: {named}")];
-        if !skip {
-            reasons.push("every sample is taken: skipping is off".into());
+    fn styles(&self) -> Styles<'_> {
+        Styles {
+            gradient_opacity: self.gradient_opacity.as_ref(),
+            silhouette: self.silhouette.as_ref(),
+            tone: self.tone.as_ref(),
+            curvature: self.curvature.as_ref(),
+            translucency: self.translucency.as_ref(),
         }
-        let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
-        let features = FEATURES[usize::from(self.shading) + 2 * usize::from(self.order == "back_to_front")];
-        Ok(ViewPlan {
-            variant: variant(volume.voxels().voxel_type(), features),
-            occupied: skip.then(|| function.opaque()),
-            step: (self.step_voxels * smallest) as f32,
-            opacity_threshold: self.opacity_threshold,
-            reasons,
-        })
     }
 
-    fn parameters(&self, volume: &Volume, _camera: &Camera) -> Result<Vec<u8>> {
-        let [low, high] = self.transfer_function(volume)?.0.domain();
-        let per_value = (TABLE_SIZE - 1) as f64 / (high - low);
-        let device = EmissionAbsorption {
-            table_scale: (volume.slope() * per_value) as f32,
-            // Half an entry, so that a value goes to the nearest.
-            table_offset: ((volume.inter() - low) * per_value + 0.5) as f32,
-            transmittance_floor: if self.opacity_threshold >= 1.0 {
-                0.0
-            } else {
-                (1.0 - self.opacity_threshold) as f32
-            },
-        };
-        Ok(bytemuck::bytes_of(&device).to_vec())
+    /// Whether the kernel with all styles is needed.
+    fn styled(&self) -> bool {
+        self.styles().any() || self.regions.is_some()
     }
 
-    fn table(&self, volume: &Volume, step: f32) -> Result<Vec<u32>> {
-        Ok(self.transfer_function(volume)?.0.table(self.opacity_scale, f64::from(step)))
+    fn interpolation(&self) -> Interpolation {
+        let labels = self.transfer_function.as_ref().is_some_and(TransferRequest::is_labels);
+        let sample = self.cuda_sample.as_ref().is_some_and(|c| !c.linear);
+        let default = if labels || sample { Interpolation::Nearest } else { Interpolation::Trilinear };
+        self.interpolation.unwrap_or(default)
     }
 
-    fn look(&self, camera: &Camera, view: &mut DeviceView) {
-        self.light.clone().unwrap_or_default().apply(camera, view);
+    /// What cannot be had together.
+    fn check_together(&self, at: &str) -> Result<()> {
+        let labels = self.transfer_function.as_ref().is_some_and(TransferRequest::is_labels);
+        let plain = self.interpolation() == Interpolation::Trilinear && !self.styled();
+        let reversed = self.order == "back_to_front";
+        let rules = [
+            (self.regions.is_some() && self.transfer_function.is_some(), "regions", "not beside transfer_function"),
+            (
+                self.cuda_sample.is_some() && self.transfer_function.is_some(),
+                "cuda_sample",
+                "not beside transfer_function",
+            ),
+            (self.cuda_sample.is_some() && self.regions.is_some(), "cuda_sample", "not beside regions"),
+            (labels && self.interpolation() != Interpolation::Nearest, "interpolation", "nearest, for labels"),
+            (
+                self.pre_integrated && (!plain || reversed),
+                "pre_integrated",
+                "only for trilinear interpolation, front to back, without regions and styles",
+            ),
+            (reversed && !plain, "order", "front_to_back, but for trilinear interpolation without regions and styles"),
+            (
+                self.curvature.is_some()
+                    && self.interpolation() != Interpolation::BSpline
+                    && self.interpolation.is_some(),
+                "interpolation",
+                "b_spline, beside curvature",
+            ),
+        ];
+        match rules.into_iter().find(|(broken, ..)| *broken) {
+            Some((_, field, permitted)) => Err(Error::invalid(
+                format!("{at}/{field}"),
+                "cannot be had together with what else is given",
+                permitted,
+            )),
+            None => Ok(()),
+        }
     }
 }

@@ -25,6 +25,8 @@ pub(crate) const VIEW_HEADERS: &[&str] = &[
     "shared/volume.h",
     "shared/packet.h",
     "shared/shade.h",
+    "shared/curvature.h",
+    "shared/style.h",
     "shared/film.h",
 ];
 

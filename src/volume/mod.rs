@@ -9,7 +9,6 @@
 
 pub mod builtin;
 mod cache;
-mod cells;
 mod inflate;
 mod info;
 mod nifti;
@@ -17,6 +16,7 @@ mod nrrd;
 mod nrrd_header;
 mod nrrd_write;
 mod parallel;
+mod range;
 mod raw;
 mod read;
 mod samples;
@@ -24,7 +24,6 @@ mod store;
 mod store_files;
 mod voxels;
 
-pub use cells::{CELL, Cells};
 pub use info::VolumeInfo;
 pub use nrrd_write::write_nrrd;
 pub use raw::{RawParams, RawQuery};
@@ -35,6 +34,7 @@ pub use voxels::{Histogram, VoxelType, Voxels};
 
 use crate::error::{Error, Result};
 use glam::{DAffine3, DMat3, DVec3};
+use range::raw_range;
 
 /// Voxel spacings outside of this range are taken for damage; in mm these are a picometre and a thousand kilometres.
 const SPACING_RANGE: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
@@ -74,11 +74,10 @@ pub struct Volume {
     range: [f64; 2],
     non_finite: u64,
     histogram: Histogram,
-    cells: Cells,
 }
 
 impl Volume {
-    /// Checks the parts and computes range, histogram and cells. Infinite voxels become NaN.
+    /// Checks the parts and computes range and histogram. Infinite voxels become NaN.
     ///
     /// # Errors
     /// [`Error::Invalid`] where spacing, axes or scaling make no sense; [`Error::Internal`] if voxels do not fit `dims`.
@@ -103,13 +102,12 @@ impl Volume {
         let world_from_index = DAffine3::from_mat3_translation(linear, -(linear * half));
 
         let non_finite = parts.voxels.make_finite_or_nan();
-        let (cells, raw_range) = Cells::new(&parts.voxels, parts.dims, parts.slope, parts.inter);
-        let range = match raw_range {
+        let range = match raw_range(&parts.voxels) {
             Some(raw) => physical_range(raw, parts.slope, parts.inter)?,
             None => [0.0; 2],
         };
         let histogram = Histogram::new(&parts.voxels, parts.slope, parts.inter, range);
-        Ok(Self { parts, world_from_index, range, non_finite, histogram, cells })
+        Ok(Self { parts, world_from_index, range, non_finite, histogram })
     }
 
     /// Voxels along x, y, z.
@@ -187,11 +185,6 @@ impl Volume {
     /// How many voxels have which value.
     pub fn histogram(&self) -> &Histogram {
         &self.histogram
-    }
-
-    /// Least and greatest value of each block of 8³ voxels.
-    pub fn cells(&self) -> &Cells {
-        &self.cells
     }
 
     /// A name for people.

@@ -151,8 +151,6 @@ fn slope_and_intercept_scale_values_and_nonsense_is_ignored() {
         let volume = read_file(&file.with(&data)).unwrap();
         assert_eq!(volume.range(), expected, "slope {slope}, inter {inter}");
         assert_eq!(volume.voxels().get_f32(23), 23.0, "raw voxels stay as they are");
-        let cells = volume.cells().min_max();
-        assert_eq!(cells, [[expected[0] as f32, expected[1] as f32]]);
     }
     let (mut file, data) = small_nifti();
     file.put_f32(112, 3e38);

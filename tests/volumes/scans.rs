@@ -42,7 +42,6 @@ fn the_brain_template_is_read_as_it_is() {
     assert_eq!(map.translation, DVec3::new(-90.5, -108.5, -90.5));
     let kept = volume.file_affine().unwrap();
     assert_eq!([kept[0][3], kept[1][3], kept[2][3]], [-90.0, -125.0, -71.0]);
-    assert_eq!(volume.cells().dims(), [23, 28, 23]);
     // White matter is the brightest of the brain, and outside of the head there is nothing.
     assert!(volume.value(90 + 25, 125 - 20, 71 + 25) > 100.0);
     assert_eq!(volume.value(1, 1, 179), 0.0);

@@ -1,0 +1,119 @@
+//! The picture of a film: over its background, in linear floats or sRGB bytes.
+
+use std::borrow::Cow;
+
+use super::{ErrorEstimate, Film};
+use crate::error::Result;
+use crate::frame;
+
+/// What is behind the volume.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Background {
+    /// A linear colour.
+    Colour([f32; 3]),
+    /// Nothing: the picture has an alpha channel.
+    Transparent,
+}
+
+impl Default for Background {
+    fn default() -> Self {
+        Self::Colour([0.0; 3])
+    }
+}
+
+impl Film {
+    /// What a picture of this film says of itself. No times: the same request and number of samples gives the same bytes.
+    pub fn description(&self, error: &ErrorEstimate) -> String {
+        let stride = self.main.stride;
+        serde_json::json!({"samples": self.main.count, "error": error.total, "error_parts": error, "stride": stride})
+            .to_string()
+    }
+
+    /// The film as PNG bytes, and how many values were clipped at white.
+    ///
+    /// # Errors
+    /// `Error::Internal` when the encoder fails.
+    pub fn png(&self, error: &ErrorEstimate) -> Result<(Vec<u8>, u64)> {
+        let (bytes, clipped) = self.srgb8();
+        Ok((frame::png(self.size, &bytes, self.description(error))?, clipped))
+    }
+
+    /// The film as OpenEXR bytes; a transparent one has an alpha channel and is premultiplied, as is usual there.
+    ///
+    /// # Errors
+    /// `Error::Internal` when the encoder fails.
+    pub fn exr(&self, error: &ErrorEstimate) -> Result<Vec<u8>> {
+        let picture: Vec<f32> = match self.background {
+            Background::Colour(behind) => self.rgba().chunks_exact(4).flat_map(|p| over(p, behind)).collect(),
+            Background::Transparent => self.rgba().into_owned(),
+        };
+        frame::exr(self.size, &picture, &self.description(error))
+    }
+
+    /// The samples in linear R, G, B (premultiplied) and alpha, row by row from the top; a preview is interpolated to the full
+    /// size.
+    fn rgba(&self) -> Cow<'_, [f32]> {
+        let [width, height] = self.size;
+        if self.main.stride == 1 {
+            return Cow::Borrowed(&self.main.mean);
+        }
+        let mut out = Vec::with_capacity(width * height * 4);
+        let place = |full: usize, n: usize| {
+            let at = (full as f32 / self.main.stride as f32).min((n - 1) as f32);
+            let low = (at as usize).min(n.saturating_sub(2));
+            (low, (low + 1).min(n - 1), at - low as f32)
+        };
+        for y in 0..height {
+            let (y0, y1, fy) = place(y, self.main.height);
+            for x in 0..width {
+                let (x0, x1, fx) = place(x, self.main.width);
+                for c in 0..4 {
+                    let at = |x: usize, y: usize| self.main.mean[4 * (y * self.main.width + x) + c];
+                    let (top, low) =
+                        (at(x0, y0) + (at(x1, y0) - at(x0, y0)) * fx, at(x0, y1) + (at(x1, y1) - at(x0, y1)) * fx);
+                    out.push(top + (low - top) * fy);
+                }
+            }
+        }
+        Cow::Owned(out)
+    }
+
+    /// The picture in sRGB bytes (IEC 61966-2-1), clipped at 1, and how many values were clipped: three a pixel, or four with
+    /// an alpha that is not multiplied into them.
+    pub fn srgb8(&self) -> (Vec<u8>, u64) {
+        let table = srgb_table();
+        let mut clipped = 0u64;
+        let mut encode = |v: f32| {
+            clipped += u64::from(v > 1.0);
+            table[(v.clamp(0.0, 1.0) * 65535.0 + 0.5) as usize]
+        };
+        let pixels = self.rgba();
+        let mut out = Vec::with_capacity(pixels.len());
+        for p in pixels.chunks_exact(4) {
+            match self.background {
+                Background::Colour(behind) => out.extend_from_slice(&over(p, behind).map(&mut encode)),
+                Background::Transparent => {
+                    let scale = if p[3] > 0.0 { 1.0 / p[3] } else { 0.0 };
+                    let [r, g, b] = [p[0], p[1], p[2]].map(|c| encode(c * scale));
+                    out.extend_from_slice(&[r, g, b, (p[3].clamp(0.0, 1.0) * 255.0 + 0.5) as u8]);
+                }
+            }
+        }
+        (out, clipped)
+    }
+}
+
+/// A premultiplied pixel over a colour.
+fn over(p: &[f32], behind: [f32; 3]) -> [f32; 3] {
+    let through = 1.0 - p[3];
+    [p[0] + through * behind[0], p[1] + through * behind[1], p[2] + through * behind[2]]
+}
+
+/// sRGB bytes by linear value in steps of 2^-16: a step is a twentieth of a grey level where the curve is steepest.
+fn srgb_table() -> &'static [u8] {
+    static TABLE: std::sync::OnceLock<Vec<u8>> = std::sync::OnceLock::new();
+    TABLE.get_or_init(|| {
+        let encode = |v: f64| if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+        (0..=65535).map(|i| (encode(f64::from(i) / 65535.0) * 255.0).round() as u8).collect()
+    })
+}

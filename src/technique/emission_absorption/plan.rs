@@ -1,0 +1,172 @@
+//! What `emission_absorption` has the device run.
+
+use super::{EmissionAbsorption, Parameters, TECHNIQUE, regions};
+use crate::device::program::{Source, Variant};
+use crate::device::structs::{DeviceStruct, View as DeviceView};
+use crate::error::Result;
+use crate::scene::camera::Camera;
+use crate::scene::interpolation::Interpolation;
+use crate::scene::presets;
+use crate::scene::transfer::{TABLE_SIZE, TransferFunction};
+use crate::technique::{VIEW_HEADERS, View, ViewPlan};
+use crate::volume::{Volume, VoxelType};
+
+type Features = [(&'static str, i32); 5];
+
+const fn features(interpolation: Interpolation, shaded: bool, reversed: bool, styled: bool, pre: bool) -> Features {
+    [
+        ("INTERPOLATION", interpolation.code()),
+        ("SHADED", shaded as i32),
+        ("BACK_TO_FRONT", reversed as i32),
+        ("STYLED", styled as i32),
+        ("PREINTEGRATED", pre as i32),
+    ]
+}
+
+const fn plain(interpolation: Interpolation, shaded: bool) -> Features {
+    features(interpolation, shaded, false, false, false)
+}
+
+const fn styled(interpolation: Interpolation) -> Features {
+    features(interpolation, false, false, true, false)
+}
+
+/// Every set of features that may be built; the first two are built before the service is ready.
+static FEATURES: [Features; 16] = {
+    use Interpolation::{BSpline, CatmullRom, Nearest, Trilinear};
+    [
+        plain(Trilinear, false),
+        plain(Trilinear, true),
+        features(Trilinear, false, true, false, false),
+        features(Trilinear, true, true, false, false),
+        features(Trilinear, false, false, false, true),
+        features(Trilinear, true, false, false, true),
+        plain(Nearest, false),
+        plain(Nearest, true),
+        plain(BSpline, false),
+        plain(BSpline, true),
+        plain(CatmullRom, false),
+        plain(CatmullRom, true),
+        styled(Trilinear),
+        styled(Nearest),
+        styled(BSpline),
+        styled(CatmullRom),
+    ]
+};
+const COMMON: usize = 2;
+const TYPES: [VoxelType; 4] = [VoxelType::U8, VoxelType::I16, VoxelType::U16, VoxelType::F32];
+
+fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
+    Variant { kernel: TECHNIQUE.name, voxel: Some(voxel), features }
+}
+
+pub(super) fn source() -> Source {
+    Source {
+        kernel: TECHNIQUE.name,
+        headers: VIEW_HEADERS,
+        structs: || DeviceView::opencl_text() + &EmissionAbsorption::opencl_text(),
+        arguments: 7,
+        variants: || FEATURES.iter().flat_map(|f| TYPES.map(|t| variant(t, f))).collect(),
+        common: COMMON * TYPES.len(),
+    }
+}
+
+impl Parameters {
+    fn transfer_function(&self, volume: &Volume) -> Result<(TransferFunction, String)> {
+        if let Some(sample) = &self.cuda_sample {
+            let range = if volume.voxel_type() == VoxelType::U8 {
+                [volume.inter(), 255.0 * volume.slope() + volume.inter()]
+            } else {
+                volume.range()
+            };
+            let half = (0..3).map(|a| volume.dims()[a] as f64 * volume.spacing()[a]).fold(0.0, f64::max) / 2.0;
+            let transfer = [sample.transfer_offset, sample.transfer_scale];
+            let points =
+                presets::cuda_sample(sample.density, transfer, [range[0].min(range[1]), range[0].max(range[1])], half);
+            return Ok((TransferFunction::Points(points), "the CUDA sample's nine colours".into()));
+        }
+        let request = self.transfer_function.clone().unwrap_or_default();
+        TransferFunction::from_request(&request, volume, "/emission_absorption/transfer_function")
+    }
+
+    fn features(&self) -> &'static Features {
+        let wanted = if self.styled() {
+            styled(self.interpolation())
+        } else {
+            let reversed = self.order == "back_to_front";
+            features(self.interpolation(), self.shading, reversed, false, self.pre_integrated)
+        };
+        // `check_together` lets nothing else through.
+        FEATURES.iter().find(|f| **f == wanted).unwrap_or(&FEATURES[0])
+    }
+
+    fn threshold(&self) -> f64 {
+        self.cuda_sample.as_ref().map_or(self.opacity_threshold, |c| c.opacity_threshold)
+    }
+}
+
+impl View for Parameters {
+    fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
+        let skip = self.empty_space_skipping && self.order == "front_to_back";
+        let (opaque, named) = match &self.regions {
+            Some(regions) => (regions::opaque(regions), format!("{} regions of value and gradient", regions.len())),
+            None => {
+                let (function, named) = self.transfer_function(volume)?;
+                (function.opaque(), format!("transfer function: {named}"))
+            }
+        };
+        let mut reasons = vec![named];
+        if !skip {
+            reasons.push("every sample is taken: skipping is off".into());
+        }
+        let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
+        Ok(ViewPlan {
+            variant: variant(volume.voxels().voxel_type(), self.features()),
+            occupied: skip.then_some(opaque),
+            step: (self.step_voxels * smallest) as f32,
+            opacity_threshold: self.threshold(),
+            reasons,
+        })
+    }
+
+    fn parameters(&self, volume: &Volume, _camera: &Camera) -> Result<Vec<u8>> {
+        let threshold = self.threshold();
+        let mut device = EmissionAbsorption {
+            transmittance_floor: if threshold >= 1.0 { 0.0 } else { (1.0 - threshold) as f32 },
+            brightness: (self.brightness * self.cuda_sample.as_ref().map_or(1.0, |c| c.brightness)) as f32,
+            lit: i32::from(self.shading),
+            ..EmissionAbsorption::default()
+        };
+        let ([low, high], entries) = match &self.regions {
+            Some(regions) => {
+                let (values, steep) = regions::extent(regions, volume);
+                device.gradient_scale = (volume.slope().abs() * 255.0 / steep) as f32;
+                (values, 256)
+            }
+            None => (self.transfer_function(volume)?.0.domain(), TABLE_SIZE),
+        };
+        let per_value = (entries - 1) as f64 / (high - low);
+        device.table_scale = (volume.slope() * per_value) as f32;
+        // Half an entry, so that a value goes to the nearest.
+        device.table_offset = ((volume.inter() - low) * per_value + 0.5) as f32;
+        self.styles().apply(volume, &mut device);
+        Ok(bytemuck::bytes_of(&device).to_vec())
+    }
+
+    fn table(&self, volume: &Volume, step: f32) -> Result<Vec<u32>> {
+        let step = f64::from(step);
+        if let Some(regions) = &self.regions {
+            return Ok(regions::table(regions, volume, self.opacity_scale, step));
+        }
+        let (function, _) = self.transfer_function(volume)?;
+        Ok(if self.pre_integrated {
+            function.integrals(self.opacity_scale)
+        } else {
+            function.table(self.opacity_scale, step)
+        })
+    }
+
+    fn look(&self, camera: &Camera, view: &mut DeviceView) {
+        self.light.clone().unwrap_or_default().apply(camera, view);
+    }
+}
