@@ -61,7 +61,7 @@ static inline Optical classify_2d(constant const EmissionAbsorption *params, glo
     return o;
 }
 
-static inline void styled_step(constant const View *view, constant const EmissionAbsorption *params, global const uchar *voxels,
+static inline void styled_step(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
                                global const uchar *table, const Packet *p, int k, Radiance *r) {
     Real t, length, raw;
     Mask inside = edge_sample(view, p, k, &t, &length);
@@ -78,12 +78,17 @@ static inline void styled_step(constant const View *view, constant const Emissio
 #endif
 
 #if PREINTEGRATED
-// The table: at each entry the integrals from the first of sigma, sigma r, sigma g, sigma b, then their integrands.
+// The table: at each entry the integrals from the first of sigma, sigma r, sigma g, sigma b, then their integrands, which
+// beyond the table stay what they are at its ends.
 static inline Real integral(global const uchar *table, int which, Real x) {
-    Int i = min(to_int(x), (Int)(TABLE_SIZE - 2));
+    Real within = clamp(x, (Real)(0.0f), (Real)(TABLE_SIZE - 1));
+    Int i = min(to_int(within), (Int)(TABLE_SIZE - 2));
     global const float *column = (global const float *)table + which;
     Real low = gather_reals(column, i << 3), high = gather_reals(column + 8, i << 3);
-    return mad(high - low, x - to_real(i), low);
+    Real sum = mad(high - low, within - to_real(i), low);
+    Mask beyond = MASK(x != within);
+    if (!any_lane(beyond)) return sum;
+    return mad(x - within, gather_reals(column + 4, to_int(within) << 3), sum);
 }
 
 // Between two values taken at the ends of a step the value is taken to be linear: the mean of a quantity over them is the
@@ -91,21 +96,21 @@ static inline Real integral(global const uchar *table, int which, Real x) {
 // Rendering Using Hardware-Accelerated Pixel Shading", 2001), so the error falls with the square of the step. Values close
 // together take the integrand in their middle.
 static inline Real between(global const uchar *table, int which, Real a, Real b, Mask close) {
-    Real middle = gather_reals((global const float *)table + 4 + which, to_int(0.5f * (a + b) + 0.5f) << 3);
+    Real place = clamp(0.5f * (a + b) + 0.5f, (Real)(0.0f), (Real)(TABLE_SIZE - 1));
+    Real middle = gather_reals((global const float *)table + 4 + which, to_int(place) << 3);
     if (!any_lane(~close)) return middle;
     Real mean = (integral(table, which, b) - integral(table, which, a)) / select(b - a, (Real)(1.0f), close);
     return select(mean, middle, close);
 }
 
-// The place of the value at t in the table, not rounded; NaN where the value is.
-static inline Real place_at(constant const View *view, constant const EmissionAbsorption *params, global const uchar *voxels, const Packet *p,
+// The place of the value at t in the table, neither rounded nor clamped; NaN where the value is.
+static inline Real place_at(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels, const Packet *p,
                             Real t) {
     Real raw = sample_raw(view, voxels, along(p->ray.origin, p->ray.direction, t));
-    Real x = clamp(mad(raw, (Real)(params->table_scale), (Real)(params->table_offset - 0.5f)), (Real)(0.0f), (Real)(TABLE_SIZE - 1));
-    return select(x, raw, MASK(raw != raw));
+    return clamp(mad(raw, (Real)(params->table_scale), (Real)(params->table_offset - 0.5f)), (Real)(-1e7f), (Real)(1e7f)) + 0.0f * raw;
 }
 
-static inline void preintegrated_step(constant const View *view, constant const EmissionAbsorption *params, global const uchar *voxels,
+static inline void preintegrated_step(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
                                       global const uchar *table, const Packet *p, int k, Radiance *r) {
     Real from = fmax((Real)((float)k * view->step), p->ray.t_near), to = fmin((Real)((float)(k + 1) * view->step), p->ray.t_far);
     Mask inside = MASK(to > from);
@@ -128,7 +133,7 @@ static inline void preintegrated_step(constant const View *view, constant const 
 #endif
 
 // A whole step of every lane, away from the box's faces.
-static inline void inner_step(constant const View *view, constant const EmissionAbsorption *params, global const uchar *voxels,
+static inline void inner_step(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
                               global const uchar *table, const Packet *p, float t, Radiance *r) {
     Real3 at = along(p->start, p->ray.direction, (Real)(t));
 #if SHADED
@@ -143,7 +148,7 @@ static inline void inner_step(constant const View *view, constant const Emission
 }
 
 // Any step: only what of it is inside the lane's ray counts, and absorbs for that long.
-static inline void edge_step(constant const View *view, constant const EmissionAbsorption *params, global const uchar *voxels,
+static inline void edge_step(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
                              global const uchar *table, const Packet *p, int k, Radiance *r) {
     Real t, length;
     Mask inside = edge_sample(view, p, k, &t, &length);
@@ -159,7 +164,7 @@ static inline void edge_step(constant const View *view, constant const EmissionA
     composite(params, o, r);
 }
 
-static inline void step(constant const View *view, constant const EmissionAbsorption *params, global const uchar *voxels,
+static inline void step(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
                         global const uchar *table, const Packet *p, int k, Radiance *r) {
 #if PREINTEGRATED
     preintegrated_step(view, params, voxels, table, p, k, r);
@@ -171,7 +176,7 @@ static inline void step(constant const View *view, constant const EmissionAbsorp
 #endif
 }
 
-kernel void emission_absorption(constant View *view, constant EmissionAbsorption *params, global const uchar *voxels,
+kernel void emission_absorption(constant View *view, constant EmissionAbsorption *params, VOLUME voxels,
                                 global const uchar *distances, global const uchar *table, global float *film, global uint *counts) {
     int number = view->first_beam + (int)get_global_id(0);
     if (number >= beams(view)) return;

@@ -21,6 +21,9 @@ pub struct DeviceArgs {
     /// Rays or photons per work-item: 1, 4, 8 or 16 (default: what the device likes)
     #[arg(long, env = "CLOUDCHAMBER_LANES", value_parser = parse_lanes)]
     pub lanes: Option<u32>,
+    /// Whether views read volumes as 3D images (default: on a GPU)
+    #[arg(long, env = "CLOUDCHAMBER_VOLUME_IMAGES")]
+    pub volume_images: Option<bool>,
     /// Folder for volumes and compiled kernels (default: $XDG_DATA_HOME/cloudchamber or ~/.local/share/cloudchamber)
     #[arg(long, env = "CLOUDCHAMBER_DATA_DIR")]
     pub data_dir: Option<PathBuf>,
@@ -47,7 +50,12 @@ impl DeviceArgs {
 
     /// What `device/` needs of this.
     pub fn device_config(&self) -> DeviceConfig {
-        DeviceConfig { wish: self.device.clone(), lanes: self.lanes, kernels: self.kernels.clone() }
+        DeviceConfig {
+            wish: self.device.clone(),
+            lanes: self.lanes,
+            kernels: self.kernels.clone(),
+            images: self.volume_images,
+        }
     }
 }
 

@@ -20,7 +20,8 @@ use cloudchamber::technique::{self};
 
 fn open(lanes: Option<u32>, kernels: Option<&Path>) -> Device {
     device::keep_compiled_kernels_in(&common::kernel_cache()).unwrap();
-    Device::open(&DeviceConfig { wish: "pocl".into(), lanes, kernels: kernels.map(Path::to_owned) }).unwrap()
+    Device::open(&DeviceConfig { wish: "pocl".into(), lanes, kernels: kernels.map(Path::to_owned), images: None })
+        .unwrap()
 }
 
 /// The offsets of every field and the size, as the device's compiler sees them.
@@ -38,6 +39,7 @@ fn offsets_on_the_device<T: DeviceStruct>() -> Vec<usize> {
         headers: &[],
         structs: T::opencl_text,
         arguments: 1,
+        volume: None,
         variants: Vec::new,
         common: 0,
     };
@@ -72,7 +74,7 @@ fn every_variant_builds_with_warnings_as_errors() {
         for t in technique::ALL {
             let source = (t.source)();
             for variant in (source.variants)() {
-                assert!(variant.options(lanes).contains("-Werror"));
+                assert!(variant.options(lanes, false).contains("-Werror"));
                 device
                     .build(&source, &variant)
                     .unwrap_or_else(|e| panic!("{} with {lanes} lanes: {e}", variant.label()));
@@ -90,8 +92,15 @@ fn a_warning_fails_the_build() {
     )
     .unwrap();
     let mut device = open(None, Some(folder.path()));
-    let source =
-        Source { kernel: "sloppy", headers: &[], structs: String::new, arguments: 1, variants: Vec::new, common: 0 };
+    let source = Source {
+        kernel: "sloppy",
+        headers: &[],
+        structs: String::new,
+        arguments: 1,
+        volume: None,
+        variants: Vec::new,
+        common: 0,
+    };
     let variant = Variant { kernel: "sloppy", voxel: None, features: &[] };
     assert!(device.build(&source, &variant).is_err());
 }
@@ -155,4 +164,38 @@ fn oclgrind_would_see_a_stray_store() {
     }
     let log = oclgrind(VIEW, "1", Some(folder.path()));
     assert!(log.contains("Invalid write"), "the log is: {log}");
+}
+
+#[test]
+fn a_volume_read_as_an_image_looks_the_same() {
+    let scene = |voxel: &str| {
+        format!(
+            r#"{{"technique": "emission_absorption", "volume": {{"builtin": "{voxel}", "resolution": 40}},
+            "image": {{"width": 48, "height": 40}}, "budget": {{"samples": 2}}, "emission_absorption": {{"shading": true}}}}"#
+        )
+    };
+    for builtin in ["marschner_lobb", "shepp_logan", "smoke"] {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("scene.json");
+        std::fs::write(&file, scene(builtin)).unwrap();
+        let render = |images: &str| {
+            let out = folder.path().join(format!("{images}.exr"));
+            let mut command = Command::new(env!("CARGO_BIN_EXE_cloudchamber"));
+            command.arg("render").arg(&file).args(["--lanes", "1", "--volume-images", images, "--data-dir"]);
+            let output = command.arg(folder.path()).arg("-o").arg(&out).output().unwrap();
+            assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+            let picture = exr::prelude::read_first_rgba_layer_from_file(
+                out,
+                |size, _| vec![[0.0f32; 3]; size.width() * size.height()],
+                |pixels: &mut Vec<[f32; 3]>, at, (r, g, b, _): (f32, f32, f32, f32)| {
+                    pixels[at.y() * 48 + at.x()] = [r, g, b]
+                },
+            );
+            picture.unwrap().layer_data.channel_data.pixels
+        };
+        let (buffer, image) = (render("false"), render("true"));
+        let worst = buffer.iter().flatten().zip(image.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(worst < 1e-3, "{builtin}: {worst:e}");
+        assert!(buffer.iter().flatten().any(|v| *v > 0.05), "{builtin} is there");
+    }
 }

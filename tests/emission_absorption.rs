@@ -14,3 +14,9 @@ mod cameras;
 mod closed_form;
 #[path = "emission_absorption/oracle.rs"]
 mod oracle;
+#[path = "emission_absorption/reference.rs"]
+mod reference;
+#[path = "emission_absorption/scenes.rs"]
+mod scenes;
+#[path = "emission_absorption/styles.rs"]
+mod styles;

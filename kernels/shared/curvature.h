@@ -19,7 +19,7 @@ static inline void b_spline_weights(Real f, Real w[4], Real d[4], Real dd[4]) {
 }
 
 // Raw value, gradient and Hessian at p, index units.
-static inline Jet b_spline_jet(constant const View *view, global const uchar *voxels, Real3 p) {
+static inline Jet b_spline_jet(constant const View *view, VOLUME voxels, Real3 p) {
     Real3 low = real3(floor(p.x - 0.5f), floor(p.y - 0.5f), floor(p.z - 0.5f));
     Real wx[4], wy[4], wz[4], dx[4], dy[4], dz[4], ex[4], ey[4], ez[4];
     b_spline_weights(p.x - 0.5f - low.x, wx, dx, ex);
@@ -67,9 +67,9 @@ static inline Symmetric congruent(constant const float *m, Symmetric h) {
 }
 
 // The principal curvatures (first >= second), per world unit, from the world gradient and Hessian; 0 where it is flat.
-static inline Curvature curvature(Real3 g, Symmetric h) {
+static inline Curvature curvature(constant const View *view, Real3 g, Symmetric h) {
     Real squared = dot3(g, g);
-    Mask flat = MASK(!(squared > 1e-24f));
+    Mask flat = MASK(!(squared > view->flat_squared));
     Real inverse = select(rsqrt(squared), (Real)(0.0f), flat);
     Real3 n = scale3(g, inverse);
     // P H P = H - n (Hn)^T - (Hn) n^T + n n^T (n.Hn)

@@ -11,7 +11,7 @@ static inline Real3 gradient_world(constant const View *view, Real3 g) {
 // to turn towards the light: full diffuse, no highlight.
 static inline Real3 shade(constant const View *view, Real3 n, Real3 ray, Real3 colour) {
     Real squared = dot3(n, n);
-    Mask flat = MASK(!(squared > 1e-24f));
+    Mask flat = MASK(!(squared > view->flat_squared));
     Real scale = select(rsqrt(squared), (Real)(0.0f), flat);
     Real3 body = real3(view->ambient, view->ambient, view->ambient), shine = real3(0.0f, 0.0f, 0.0f);
     for (int i = 0; i < view->lights; i++) {

@@ -5,20 +5,20 @@
 typedef struct { Real3 gradient, normal, ray; Real magnitude, facing; Mask flat; Curvature bend; } Surface;
 
 // The surface through p: `gradient` in raw values per world unit, `normal` towards lower values, `facing` = |normal . ray|.
-static inline Surface surface_at(constant const View *view, constant const EmissionAbsorption *params, global const uchar *voxels, Real3 p,
+static inline Surface surface_at(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels, Real3 p,
                                  Real3 ray, Real *raw) {
     Surface s;
     if (params->curvature_full > 0.0f) {
         Jet jet = b_spline_jet(view, voxels, p);
         *raw = jet.value;
         s.gradient = gradient_world(view, jet.gradient);
-        s.bend = curvature(s.gradient, congruent(view->world_gradient_from_index, jet.hessian));
+        s.bend = curvature(view, s.gradient, congruent(view->world_gradient_from_index, jet.hessian));
     } else {
         *raw = sample_raw(view, voxels, p);
         s.gradient = gradient_world(view, gradient_raw(view, voxels, p));
     }
     Real squared = dot3(s.gradient, s.gradient);
-    s.flat = MASK(!(squared > 1e-24f));
+    s.flat = MASK(!(squared > view->flat_squared));
     s.magnitude = select(sqrt(squared), (Real)(0.0f), s.flat);
     s.normal = scale3(s.gradient, select(-rsqrt(squared), (Real)(0.0f), s.flat));
     s.ray = ray;

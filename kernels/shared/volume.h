@@ -10,11 +10,26 @@
 #define INTERPOLATION TRILINEAR
 #endif
 
+// A volume is a buffer; on a GPU it is a 3D image, whose sampler interpolates in hardware (its weights have 8 fractional bits).
+// The functions that read it have a body for each.
+#if VOLUMES_ARE_IMAGES
+#define VOLUME read_only image3d_t
+constant const sampler_t linear_sampler = CLK_NORMALIZED_COORDS_FALSE | CLK_ADDRESS_CLAMP_TO_EDGE | CLK_FILTER_LINEAR;
+constant const sampler_t point_sampler = CLK_NORMALIZED_COORDS_FALSE | CLK_ADDRESS_CLAMP_TO_EDGE | CLK_FILTER_NEAREST;
+// Samplers filter whole numbers as parts of the largest.
+#define CHANNEL_SCALE (VOXEL == VOXEL_U8 ? 255.0f : VOXEL == VOXEL_I16 ? 32767.0f : VOXEL == VOXEL_U16 ? 65535.0f : 1.0f)
+#else
+#define VOLUME global const uchar *
+#endif
+
 // One voxel a lane; the index is clamped to the grid.
-static inline Real voxel_raw(constant const View *view, global const uchar *voxels, Int x, Int y, Int z) {
+static inline Real voxel_raw(constant const View *view, VOLUME voxels, Int x, Int y, Int z) {
     x = clamp(x, (Int)(0), (Int)(view->dims[0] - 1));
     y = clamp(y, (Int)(0), (Int)(view->dims[1] - 1));
     z = clamp(z, (Int)(0), (Int)(view->dims[2] - 1));
+#if VOLUMES_ARE_IMAGES
+    return read_imagef(voxels, point_sampler, (int4)(x, y, z, 0)).x * CHANNEL_SCALE;
+#else
     Int word = gather_words(voxels, ((z * view->dims[1] + y) * view->dims[0] + x) * VOXEL_BYTES);
 #if VOXEL == VOXEL_U8
     return to_real(word & 0xff);
@@ -25,10 +40,11 @@ static inline Real voxel_raw(constant const View *view, global const uchar *voxe
 #else
     return as_Real(word);
 #endif
+#endif
 }
 
 // The value of the voxel that p is in.
-static inline Real nearest_raw(constant const View *view, global const uchar *voxels, Real3 p) {
+static inline Real nearest_raw(constant const View *view, VOLUME voxels, Real3 p) {
     return voxel_raw(view, voxels, to_int(floor(p.x)), to_int(floor(p.y)), to_int(floor(p.z)));
 }
 
@@ -62,7 +78,7 @@ static inline void tap_weights(Real f, Real weight[TAPS], Real slope[TAPS]) {
 }
 
 // The value at p and the gradient of the interpolant itself, in index units, tap by tap.
-static inline Real taps_raw(constant const View *view, global const uchar *voxels, Real3 p, Real3 *gradient) {
+static inline Real taps_raw(constant const View *view, VOLUME voxels, Real3 p, Real3 *gradient) {
     Real3 low = real3(floor(p.x - 0.5f), floor(p.y - 0.5f), floor(p.z - 0.5f));
     Real wx[TAPS], wy[TAPS], wz[TAPS], dx[TAPS], dy[TAPS], dz[TAPS];
     tap_weights(p.x - 0.5f - low.x, wx, dx);
@@ -87,6 +103,12 @@ static inline Real taps_raw(constant const View *view, global const uchar *voxel
     return value;
 }
 
+#if VOLUMES_ARE_IMAGES
+// The raw value (before slope and intercept) at p, trilinear.
+static inline Real trilinear_raw(constant const View *view, VOLUME voxels, Real3 p) {
+    return read_imagef(voxels, linear_sampler, (float4)(p.x, p.y, p.z, 0.0f)).x * CHANNEL_SCALE;
+}
+#else
 // Two neighbours in x, one load where their bits fit in a word: loads, not arithmetic, are what a sample costs.
 static inline Real lerp_x(global const uchar *voxels, Int byte_offset, Real f) {
 #if VOXEL == VOXEL_F32
@@ -105,7 +127,7 @@ static inline Real lerp_x(global const uchar *voxels, Int byte_offset, Real f) {
 }
 
 // The raw value (before slope and intercept) at p, trilinear. A NaN voxel makes the whole of its eight cells NaN.
-static inline Real trilinear_raw(constant const View *view, global const uchar *voxels, Real3 p) {
+static inline Real trilinear_raw(constant const View *view, VOLUME voxels, Real3 p) {
     int nx = view->dims[0], ny = view->dims[1], nz = view->dims[2];
     Real x = clamp(p.x - 0.5f, (Real)(0.0f), (Real)(nx - 1));
     Real y = clamp(p.y - 0.5f, (Real)(0.0f), (Real)(ny - 1));
@@ -119,9 +141,10 @@ static inline Real trilinear_raw(constant const View *view, global const uchar *
     Real front = mad(low - near, fy, near), back = mad(deep - far, fy, far);
     return mad(back - front, fz, front);
 }
+#endif
 
 // The raw value at p by the interpolation that is compiled in.
-static inline Real sample_raw(constant const View *view, global const uchar *voxels, Real3 p) {
+static inline Real sample_raw(constant const View *view, VOLUME voxels, Real3 p) {
 #if INTERPOLATION == NEAREST
     return nearest_raw(view, voxels, p);
 #elif INTERPOLATION == TRILINEAR
@@ -133,7 +156,7 @@ static inline Real sample_raw(constant const View *view, global const uchar *vox
 }
 
 // The gradient of the raw value in index units, by central differences one voxel to each side.
-static inline Real3 gradient_raw(constant const View *view, global const uchar *voxels, Real3 p) {
+static inline Real3 gradient_raw(constant const View *view, VOLUME voxels, Real3 p) {
     Real3 g;
     g.x = sample_raw(view, voxels, real3(p.x + 1.0f, p.y, p.z)) - sample_raw(view, voxels, real3(p.x - 1.0f, p.y, p.z));
     g.y = sample_raw(view, voxels, real3(p.x, p.y + 1.0f, p.z)) - sample_raw(view, voxels, real3(p.x, p.y - 1.0f, p.z));
@@ -182,7 +205,7 @@ static inline Real across(Words pair, Words weights) {
     return to_real(__builtin_astype(__builtin_ia32_pmaddwd512(pair, weights), Int)) * INNER_UNIT;
 }
 
-static inline Real inner_raw(constant const View *view, global const uchar *voxels, Real3 p) {
+static inline Real inner_raw(constant const View *view, VOLUME voxels, Real3 p) {
     Inner i = inner_at(view, p);
     int row = view->dims[0], sheet = view->dims[0] * view->dims[1];
     Int a = gather_words(voxels, i.at), b = gather_words(voxels + row, i.at);
@@ -192,7 +215,7 @@ static inline Real inner_raw(constant const View *view, global const uchar *voxe
 }
 
 // Twelve gathers instead of the 28 of seven values: a gather of four voxels in x serves three of them, and rows are shared.
-static inline Real inner_gradient(constant const View *view, global const uchar *voxels, Real3 p, Real3 *gradient) {
+static inline Real inner_gradient(constant const View *view, VOLUME voxels, Real3 p, Real3 *gradient) {
     Inner i = inner_at(view, p);
     int row = view->dims[0], sheet = view->dims[0] * view->dims[1];
     global const uchar *from = voxels - 1; // the lanes are a voxel or more inside
@@ -211,10 +234,10 @@ static inline Real inner_gradient(constant const View *view, global const uchar 
     return across(WEIGH(y0, y1, i.y), i.x);
 }
 #else
-static inline Real inner_raw(constant const View *view, global const uchar *voxels, Real3 p) {
-#if INTERPOLATION != TRILINEAR
+static inline Real inner_raw(constant const View *view, VOLUME voxels, Real3 p) {
+#if INTERPOLATION != TRILINEAR || VOLUMES_ARE_IMAGES
     return sample_raw(view, voxels, p);
-#endif
+#else
     Real x = p.x - 0.5f, y = p.y - 0.5f, z = p.z - 0.5f;
     Int ix = to_int(x), iy = to_int(y), iz = to_int(z);
     Real fx = x - to_real(ix), fy = y - to_real(iy), fz = z - to_real(iz);
@@ -224,9 +247,10 @@ static inline Real inner_raw(constant const View *view, global const uchar *voxe
     Real far = lerp_x(voxels + sheet, at, fx), deep = lerp_x(voxels + sheet + row, at, fx);
     Real front = mad(low - near, fy, near), back = mad(deep - far, fy, far);
     return mad(back - front, fz, front);
+#endif
 }
 
-static inline Real inner_gradient(constant const View *view, global const uchar *voxels, Real3 p, Real3 *gradient) {
+static inline Real inner_gradient(constant const View *view, VOLUME voxels, Real3 p, Real3 *gradient) {
     *gradient = gradient_raw(view, voxels, p);
     return inner_raw(view, voxels, p);
 }

@@ -37,6 +37,7 @@ fn source(kernel: &'static str, arguments: usize, variants: fn() -> Vec<Variant>
         headers: &["shared/voxel.h"],
         structs: CellsPass::opencl_text,
         arguments,
+        volume: None,
         variants,
         common: TYPES.len(),
     }

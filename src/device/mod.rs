@@ -3,6 +3,7 @@
 //! A [`Device`] lives on the thread that opened it (the job engine's), so that everything else stays free of OpenCL.
 
 pub mod cells;
+mod images;
 pub mod program;
 mod select;
 pub mod structs;
@@ -15,7 +16,7 @@ use std::time::{Duration, Instant};
 use opencl3::command_queue::CommandQueue;
 use opencl3::context::Context;
 use opencl3::kernel::Kernel;
-use opencl3::memory::{Buffer as ClBuffer, CL_MEM_READ_WRITE, ClMem};
+use opencl3::memory::{Buffer as ClBuffer, CL_MEM_READ_WRITE, ClMem, Image};
 use opencl3::program::Program;
 use opencl3::types::{CL_BLOCKING, cl_mem, cl_uchar};
 
@@ -33,12 +34,19 @@ pub struct DeviceConfig {
     pub lanes: Option<u32>,
     /// Kernel files are read from here instead of the binary.
     pub kernels: Option<PathBuf>,
+    /// Whether views sample volumes as 3D images; by default where the device is a GPU that can.
+    pub images: Option<bool>,
 }
 
-/// Bytes on the device.
+/// Bytes on the device: a buffer, or a volume's voxels as a 3D image, which only kernels read.
 pub struct Buffer {
-    memory: ClBuffer<cl_uchar>,
+    memory: Memory,
     bytes: usize,
+}
+
+enum Memory {
+    Bytes(ClBuffer<cl_uchar>),
+    Image(Image),
 }
 
 impl Buffer {
@@ -65,37 +73,6 @@ pub struct Device {
 
 fn cl<T>(doing: &str, result: std::result::Result<T, opencl3::error_codes::ClError>) -> Result<T> {
     result.map_err(|e| Error::internal(format!("OpenCL, {doing}: {e}")))
-}
-
-/// The formats of read-only 3D images, by OpenCL's names for the ones in use here and by number for the rest.
-fn image_formats(context: &Context) -> Vec<String> {
-    use opencl3::memory as m;
-    let order = |o| match o {
-        m::CL_R => "R".into(),
-        m::CL_RG => "RG".into(),
-        m::CL_RGBA => "RGBA".into(),
-        m::CL_INTENSITY => "INTENSITY".into(),
-        m::CL_LUMINANCE => "LUMINANCE".into(),
-        other => format!("{other:#x}"),
-    };
-    let kind = |t| match t {
-        m::CL_UNORM_INT8 => "UNORM_INT8".into(),
-        m::CL_UNORM_INT16 => "UNORM_INT16".into(),
-        m::CL_SNORM_INT16 => "SNORM_INT16".into(),
-        m::CL_UNSIGNED_INT8 => "UNSIGNED_INT8".into(),
-        m::CL_UNSIGNED_INT16 => "UNSIGNED_INT16".into(),
-        m::CL_SIGNED_INT16 => "SIGNED_INT16".into(),
-        m::CL_HALF_FLOAT => "HALF_FLOAT".into(),
-        m::CL_FLOAT => "FLOAT".into(),
-        other => format!("{other:#x}"),
-    };
-    let formats =
-        context.get_supported_image_formats(m::CL_MEM_READ_ONLY, m::CL_MEM_OBJECT_IMAGE3D).unwrap_or_default();
-    let name = |f: &opencl3::types::cl_image_format| -> String {
-        let (order, kind): (String, String) = (order(f.image_channel_order), kind(f.image_channel_data_type));
-        format!("{order}/{kind}")
-    };
-    formats.iter().map(name).collect()
 }
 
 /// Points PoCL's compiled-kernel cache at `cache`, unless the environment names one already, and makes sure that code can be
@@ -131,10 +108,11 @@ impl Device {
     /// [`Error::Internal`] when there is none or OpenCL fails.
     pub fn open(config: &DeviceConfig) -> Result<Self> {
         let (device, mut info) = select(&config.wish, config.lanes)?;
+        info.use_images(config.images);
         let context = cl("creating the context", Context::from_device(&device))?;
         // The 1.x form: PoCL 3.1 and NVIDIA's OpenCL both have it.
         let queue = cl("creating the queue", CommandQueue::create_default(&context, 0))?;
-        info.image_formats_3d = image_formats(&context);
+        info.image_formats_3d = images::formats(&context);
         Ok(Self { info, id: device.id(), context, queue, kernels: HashMap::new(), overrides: config.kernels.clone() })
     }
 
@@ -159,7 +137,7 @@ impl Device {
         }
         let text = source.text(self.overrides.as_deref())?;
         let mut program = cl("creating a program", Program::create_from_source(&self.context, &text))?;
-        if let Err(code) = program.build(&[self.id], &variant.options(self.info.lanes)) {
+        if let Err(code) = program.build(&[self.id], &variant.options(self.info.lanes, self.info.volumes_are_images)) {
             let log = program.get_build_log(self.id).unwrap_or_default();
             return Err(Error::internal(format!("building {}: {code}\n{log}", variant.label())));
         }
@@ -176,7 +154,7 @@ impl Device {
         let bytes = bytes.max(1);
         // SAFETY: no host pointer is given, so there is no memory of ours whose validity matters.
         let memory = unsafe { ClBuffer::create(&self.context, CL_MEM_READ_WRITE, bytes, ptr::null_mut()) };
-        Ok(Buffer { memory: cl("allocating a buffer", memory)?, bytes })
+        Ok(Buffer { memory: Memory::Bytes(cl("allocating a buffer", memory)?), bytes })
     }
 
     /// A buffer that holds `data` and `padding` zero bytes behind it.
@@ -198,11 +176,11 @@ impl Device {
         if data.is_empty() {
             return Ok(());
         }
-        if offset + data.len() > buffer.bytes {
-            return Err(Error::internal("a write past the end of a device buffer"));
-        }
+        let (true, Memory::Bytes(memory)) = (offset + data.len() <= buffer.bytes, &mut buffer.memory) else {
+            return Err(Error::internal("a write past the end of a device buffer, or to an image"));
+        };
         // SAFETY: the range was checked above, and the call blocks until `data` has been read.
-        let event = unsafe { self.queue.enqueue_write_buffer(&mut buffer.memory, CL_BLOCKING, offset, data, &[]) };
+        let event = unsafe { self.queue.enqueue_write_buffer(memory, CL_BLOCKING, offset, data, &[]) };
         cl("writing a buffer", event).map(drop)
     }
 
@@ -215,11 +193,11 @@ impl Device {
         if bytes.is_empty() {
             return Ok(());
         }
-        if offset + bytes.len() > buffer.bytes {
-            return Err(Error::internal("a read past the end of a device buffer"));
-        }
+        let (true, Memory::Bytes(memory)) = (offset + bytes.len() <= buffer.bytes, &buffer.memory) else {
+            return Err(Error::internal("a read past the end of a device buffer, or of an image"));
+        };
         // SAFETY: the range was checked above, `bytes` is plain data, and the call blocks until it is filled.
-        let event = unsafe { self.queue.enqueue_read_buffer(&buffer.memory, CL_BLOCKING, offset, bytes, &[]) };
+        let event = unsafe { self.queue.enqueue_read_buffer(memory, CL_BLOCKING, offset, bytes, &[]) };
         cl("reading a buffer", event).map(drop)
     }
 
@@ -234,7 +212,10 @@ impl Device {
         let kernel =
             self.kernels.get(variant).ok_or_else(|| Error::internal(format!("{} is not built", variant.label())))?;
         for (index, buffer) in arguments.iter().enumerate() {
-            let memory: cl_mem = buffer.memory.get();
+            let memory: cl_mem = match &buffer.memory {
+                Memory::Bytes(memory) => memory.get(),
+                Memory::Image(image) => image.get(),
+            };
             // SAFETY: every kernel argument here is a buffer, and a cl_mem of this context is what clSetKernelArg takes for one.
             cl("setting an argument", unsafe { kernel.set_arg(index as u32, &memory) })?;
         }

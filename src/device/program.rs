@@ -30,6 +30,8 @@ pub struct Source {
     pub structs: fn() -> String,
     /// How many buffers the kernel takes.
     pub arguments: usize,
+    /// Which of them is the volume, where it may be an image.
+    pub volume: Option<usize>,
     /// Every variant that may be built.
     pub variants: fn() -> Vec<Variant>,
     /// How many of them, from the first, are built before the service is ready; the others when they are first asked for.
@@ -63,10 +65,13 @@ impl Source {
 
 impl Variant {
     /// The build options. Not `-cl-fast-relaxed-math`: it would let the compiler assume that no NaN occurs.
-    pub fn options(&self, lanes: u32) -> String {
+    pub fn options(&self, lanes: u32, images: bool) -> String {
         let mut options = format!("-cl-std=CL1.2 -Werror -cl-mad-enable -cl-no-signed-zeros -DLANES={lanes}");
         for (name, code) in [("VOXEL_U8", 0), ("VOXEL_I16", 1), ("VOXEL_U16", 2), ("VOXEL_F32", 3)] {
             options += &format!(" -D{name}={code}");
+        }
+        if images {
+            options += " -DVOLUMES_ARE_IMAGES=1";
         }
         if let Some(voxel) = self.voxel {
             let code = match voxel {

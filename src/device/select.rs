@@ -41,12 +41,42 @@ pub struct DeviceInfo {
     pub image_formats_3d: Vec<String>,
     /// The largest 3D image, voxels a side.
     pub largest_image_3d: [usize; 3],
+    /// How images may be read: filters and what is beyond the edge.
+    pub sampler_modes: &'static [&'static str],
+    /// Whether views read volumes as images, filtered by the device's sampler; otherwise from buffers, by the kernels.
+    pub volumes_are_images: bool,
+    /// The same in words, with its precision.
+    pub volume_sampling: &'static str,
     /// Whether 64-bit integer atomics are there (photon transport needs them).
     pub int64_atomics: bool,
     /// Rays or photons that one work-item carries here.
     pub lanes: u32,
     /// Work-items in a work-group here.
     pub local_size: usize,
+}
+
+/// What OpenCL C 1.2 promises wherever there are images.
+const SAMPLER_MODES: &[&str] = &[
+    "filter nearest",
+    "filter linear",
+    "address none",
+    "address clamp",
+    "address clamp_to_edge",
+    "address repeat (normalised coordinates)",
+    "address mirrored_repeat (normalised coordinates)",
+];
+const FROM_BUFFERS: &str = "buffer: interpolated by the kernels in single precision (bytes: to 2^-7 of a grey level)";
+const FROM_IMAGES: &str = "image: trilinear by the device's sampler, whose weights have 8 fractional bits on a GPU";
+
+impl DeviceInfo {
+    /// Takes volumes as images where `wish` says so, or by default on a GPU that has them; then a work-item is one ray.
+    pub(super) fn use_images(&mut self, wish: Option<bool>) {
+        self.volumes_are_images = self.image_support && wish.unwrap_or(self.kind == "gpu" && self.lanes == 1);
+        if self.volumes_are_images {
+            self.lanes = 1;
+            self.volume_sampling = FROM_IMAGES;
+        }
+    }
 }
 
 fn cl<T>(result: std::result::Result<T, opencl3::error_codes::ClError>) -> Result<T> {
@@ -94,6 +124,9 @@ fn describe(platform: &Platform, device: &ClDevice, forced_lanes: Option<u32>) -
             [0; 3]
         },
         image_formats_3d: Vec::new(),
+        sampler_modes: if image_support { SAMPLER_MODES } else { &[] },
+        volumes_are_images: false,
+        volume_sampling: FROM_BUFFERS,
         int64_atomics: cl(device.extensions())?.contains("cl_khr_int64_base_atomics"),
         lanes,
         // A CPU work-item is already a packet, so a group is only the unit that threads share out; a GPU wants whole warps.

@@ -121,6 +121,8 @@ device_struct! {
         pub plane_index: [f32; 4 * PLANES],
         /// Row by row: world gradient = this × gradient in index units.
         pub world_gradient_from_index: [f32; 9],
+        /// The square of the gradient (raw values per world unit) below which there is no telling where it points.
+        pub flat_squared: f32,
         /// Weight of light from everywhere.
         pub ambient: f32,
         /// Weight of Lambert's term.

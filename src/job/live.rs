@@ -19,7 +19,7 @@ use crate::film::Film;
 use crate::film::picture::Background;
 use crate::scene::{Scene, Subject};
 use crate::technique;
-use crate::volume::Volume;
+use crate::volume::{Volume, Voxels};
 
 /// A turn on the device: long enough to be worth a launch, short enough that nobody waits and a cancel is felt at once.
 const SLICE: Duration = Duration::from_millis(20);
@@ -71,6 +71,17 @@ impl DeviceContext {
         }
         let voxels = self.device.upload(volume.voxels().as_bytes(), 8)?;
         let cells = Cells::new(&mut self.device, &voxels, volume.dims(), volume.voxel_type())?;
+        let [wide, high, deep] = volume.dims();
+        let most = self.device.info().largest_image_3d;
+        let fits = wide <= most[0] && high <= most[1] && deep <= most[2];
+        let voxels = if self.device.info().volumes_are_images {
+            if !fits {
+                return Err(Error::internal(format!("the device takes images of at most {most:?} voxels")));
+            }
+            self.device.upload_image(volume.voxels(), volume.dims())?
+        } else {
+            voxels
+        };
         let on_device = Rc::new(DeviceVolume { voxels, cells });
         self.volumes.insert(key, (Arc::downgrade(volume), on_device.clone()));
         self.tidy();
@@ -97,7 +108,10 @@ pub(super) fn warm(device: &mut Device, source: &Source, variant: &Variant) -> R
     }
     device.build(source, variant)?;
     // Zeroed buffers ask for an image of no pixels or a launch of no histories: compiled, and nothing done.
-    let zero: Vec<Buffer> = (0..source.arguments).map(|_| device.upload(&[0; 1024], 0)).collect::<Result<_>>()?;
+    let mut zero: Vec<Buffer> = (0..source.arguments).map(|_| device.upload(&[0; 1024], 0)).collect::<Result<_>>()?;
+    if let (Some(volume), true) = (source.volume, device.info().volumes_are_images) {
+        zero[volume] = device.upload_image(&Voxels::U8(vec![0]), [1; 3])?;
+    }
     device.run(variant, &zero.iter().collect::<Vec<_>>(), 1).map(drop)
 }
 

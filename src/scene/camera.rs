@@ -148,10 +148,18 @@ impl Camera {
             // A gradient is a covector: it goes to the world by the transpose of index-from-world. The sign of the slope does
             // not matter, since lights are two-sided.
             world_gradient_from_index: volume.world_from_index().matrix3.inverse().to_cols_array().map(|v| v as f32),
+            flat_squared: flat_squared(volume),
             jittered: 1,
             ..View::default()
         }
     }
+}
+
+/// What rounding alone may make of a gradient, squared: values are interpolated to about 2^-15 of their range.
+fn flat_squared(volume: &Volume) -> f32 {
+    let [low, high] = volume.range();
+    let voxel = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
+    (3e-5 * (high - low) / volume.slope().abs() / voxel).powi(2).max(1e-24) as f32
 }
 
 /// What is needed of a volume to frame it: its box in the world and which way is up.

@@ -212,6 +212,7 @@ fn source() -> Source {
                 + &PhotonTransport::opencl_text()
         },
         arguments: 5,
+        volume: None,
         variants: || vec![VARIANT],
         common: usize::MAX,
     }

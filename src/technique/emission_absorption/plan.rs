@@ -66,6 +66,7 @@ pub(super) fn source() -> Source {
         headers: VIEW_HEADERS,
         structs: || DeviceView::opencl_text() + &EmissionAbsorption::opencl_text(),
         arguments: 7,
+        volume: Some(2),
         variants: || FEATURES.iter().flat_map(|f| TYPES.map(|t| variant(t, f))).collect(),
         common: COMMON * TYPES.len(),
     }
