@@ -155,31 +155,40 @@ typedef char Bytes __attribute__((ext_vector_type(64)));
 #define FOUR(a, b, c, d) ((Int)(a, b, c, d, a, b, c, d, a, b, c, d, a, b, c, d))
 #define SHUFFLE(v, order) __builtin_astype(__builtin_ia32_pshufb512(__builtin_astype(v, Bytes), __builtin_astype(order, Bytes)), Words)
 // The bytes n and n + 1 of each lane as two words of 7 fractional bits.
-#define PAIR(v, n) (SHUFFLE(v, FOUR(0x80018000 + (n) * 0x10001, 0x80058004 + (n) * 0x10001, 0x80098008 + (n) * 0x10001, \
-                                    0x800d800c + (n) * 0x10001)) << (Words)(7))
+#define PAIR_ORDER FOUR(0x80018000, 0x80058004, 0x80098008, 0x800d800c)
+#define PAIR(v, n) (SHUFFLE(v, PAIR_ORDER + (n) * 0x10001) << (Words)(7))
 #define WEIGH(a, b, f) ((a) + __builtin_ia32_pmulhrsw512((b) - (a), f))
 #define INNER_UNIT (1.0f / (128.0f * 32767.0f))
+// A place comes with 15 binary places in x and 16 in y and z: where the integer arithmetic wants them.
+#define INNER_X 32768.0f
+#define INNER_YZ 65536.0f
 
 typedef struct { Int at; Words x, y, z; } Inner; // byte offset of the lowest corner, weights
 
-// The low 16 bits of each lane, halved, in both words.
-static inline Words fraction_words(Int fixed) {
-    Words both = SHUFFLE(fixed, FOUR(0x01000100, 0x05040504, 0x09080908, 0x0d0c0d0c));
-    return AS_WORDS(__builtin_astype(both, UWords) >> (UWords)(1));
+// The low 16 bits of each lane in both words.
+#define BOTH(v) SHUFFLE(v, FOUR(0x01000100, 0x05040504, 0x09080908, 0x0d0c0d0c))
+// The high 16 bits of each lane times a number of 16 bits.
+#define HIGH_TIMES(v, by) __builtin_astype(__builtin_ia32_pmaddwd512(AS_WORDS(v), AS_WORDS((Int)((by) << 16))), Int)
+
+// All but i.at.
+static inline Inner inner_weights(Int x, Int y, Int z) {
+    Inner i;
+    Int f = __builtin_astype(BOTH(x), Int); // (1 - f, f) is (f & 0x7fff7fff) ^ 0x7fff, in one instruction
+    i.x = AS_WORDS(__builtin_ia32_pternlogd512_mask(f, (Int)(0x7fff7fff), (Int)(0x7fff), 0x6a, (short)-1));
+    i.y = AS_WORDS(__builtin_astype(BOTH(y), UWords) >> (UWords)(1));
+    i.z = AS_WORDS(__builtin_astype(BOTH(z), UWords) >> (UWords)(1));
+    return i;
 }
 
 static inline Inner inner_at(constant const View *view, Real3 p) {
-    Int x = to_int(mad(p.x, 65536.0f, -32768.0f)), y = to_int(mad(p.y, 65536.0f, -32768.0f)), z = to_int(mad(p.z, 65536.0f, -32768.0f));
-    Inner i;
-    i.at = ((z >> 16) * view->dims[1] + (y >> 16)) * view->dims[0] + (x >> 16);
-    i.x = AS_WORDS(__builtin_astype(fraction_words(x), Int) ^ (Int)(0x7fff)); // (1 - f, f)
-    i.y = fraction_words(y);
-    i.z = fraction_words(z);
+    Int x = to_int(p.x), y = to_int(p.y), z = to_int(p.z);
+    Inner i = inner_weights(x, y, z);
+    i.at = (HIGH_TIMES(z, view->dims[1]) + HIGH_TIMES(y, 1)) * view->dims[0] + (x >> 15);
     return i;
 }
 
 static inline Real across(Words pair, Words weights) {
-    return to_real(__builtin_astype(__builtin_ia32_pmaddwd512(pair, weights), Int)) * INNER_UNIT;
+    return to_real(__builtin_astype(__builtin_ia32_pmaddwd512(pair, weights), Int));
 }
 
 static inline Real inner_raw(constant const View *view, global const uchar *voxels, Real3 p) {
@@ -191,6 +200,25 @@ static inline Real inner_raw(constant const View *view, global const uchar *voxe
     return across(WEIGH(near, far, i.y), i.x);
 }
 
+// The same where all lanes are within NARROW voxels of each other: the block of 4 x 4 x 4 voxels from `first` on, which is at
+// most the lanes' least place, comes with one gather, a row a lane, and is read by permutations.
+#define NARROW 1.98f
+
+static inline Real narrow_raw(constant const View *view, global const uchar *voxels, Real3 p, int4 first) {
+    int row = view->dims[0], sheet = view->dims[0] * view->dims[1];
+    first = min(first, (int4)(row, view->dims[1], view->dims[2], 4) - 4);
+    global const uchar *corner = voxels + ((size_t)first.z * sheet + first.y * row + first.x);
+    Int block = gather_words(corner, (LANE_IDS & 3) * row + (LANE_IDS >> 2) * sheet);
+    Int x = to_int(p.x), y = to_int(p.y), z = to_int(p.z);
+    Inner i = inner_weights(x, y, z);
+    Int at = HIGH_TIMES(z, 4) + HIGH_TIMES(y, 1) - (first.z * 4 + first.y);
+    Int order = __builtin_astype(BOTH(x >> 15), Int) + (PAIR_ORDER - first.x * 0x10001);
+    #define ROW(n) (SHUFFLE(__builtin_ia32_permvarsi512(block, at + (n)), order) << (Words)(7))
+    Words near = WEIGH(ROW(0), ROW(4), i.z), far = WEIGH(ROW(1), ROW(5), i.z);
+    #undef ROW
+    return across(WEIGH(near, far, i.y), i.x);
+}
+
 // Twelve gathers instead of the 28 of seven values: a gather of four voxels in x serves three of them, and rows are shared.
 static inline Real inner_gradient(constant const View *view, global const uchar *voxels, Real3 p, Real3 *gradient) {
     Inner i = inner_at(view, p);
@@ -198,26 +226,31 @@ static inline Real inner_gradient(constant const View *view, global const uchar 
     global const uchar *from = voxels - 1; // the lanes are a voxel or more inside
     #define ROW(y, z) gather_words(from + ((y) * row + (z) * sheet), i.at)
     Int a = ROW(0, 0), b = ROW(1, 0), c = ROW(0, 1), d = ROW(1, 1);
+    // Weighed first, subtracted last: a difference of differences would not fit in a word.
+    #define SQUARE(n) WEIGH(WEIGH(PAIR(a, n), PAIR(c, n), i.z), WEIGH(PAIR(b, n), PAIR(d, n), i.z), i.y)
+    gradient->x = 0.5f * INNER_UNIT * across(SQUARE(2) - SQUARE(0), i.x);
+    #undef SQUARE
     Words a1 = PAIR(a, 1), b1 = PAIR(b, 1), c1 = PAIR(c, 1), d1 = PAIR(d, 1);
-    Words left = WEIGH(PAIR(a, 2) - PAIR(a, 0), PAIR(c, 2) - PAIR(c, 0), i.z), right = WEIGH(PAIR(b, 2) - PAIR(b, 0), PAIR(d, 2) - PAIR(d, 0), i.z);
-    gradient->x = 0.5f * across(WEIGH(left, right, i.y), i.x);
     Words y0 = WEIGH(a1, c1, i.z), y1 = WEIGH(b1, d1, i.z);
     Words before = WEIGH(PAIR(ROW(-1, 0), 1), PAIR(ROW(-1, 1), 1), i.z), after = WEIGH(PAIR(ROW(2, 0), 1), PAIR(ROW(2, 1), 1), i.z);
-    gradient->y = 0.5f * across(WEIGH(y1 - before, after - y0, i.y), i.x);
+    gradient->y = 0.5f * INNER_UNIT * across(WEIGH(y1, after, i.y) - WEIGH(before, y0, i.y), i.x);
     Words z0 = WEIGH(a1, b1, i.y), z1 = WEIGH(c1, d1, i.y);
     before = WEIGH(PAIR(ROW(0, -1), 1), PAIR(ROW(1, -1), 1), i.y), after = WEIGH(PAIR(ROW(0, 2), 1), PAIR(ROW(1, 2), 1), i.y);
-    gradient->z = 0.5f * across(WEIGH(z1 - before, after - z0, i.z), i.x);
+    gradient->z = 0.5f * INNER_UNIT * across(WEIGH(z1, after, i.z) - WEIGH(before, z0, i.z), i.x);
     #undef ROW
     return across(WEIGH(y0, y1, i.y), i.x);
 }
 #else
+#define INNER_UNIT 1.0f
+#define INNER_X 1.0f
+#define INNER_YZ 1.0f
+
 static inline Real inner_raw(constant const View *view, global const uchar *voxels, Real3 p) {
 #if INTERPOLATION != TRILINEAR
-    return sample_raw(view, voxels, p);
+    return sample_raw(view, voxels, real3(p.x + 0.5f, p.y + 0.5f, p.z + 0.5f));
 #endif
-    Real x = p.x - 0.5f, y = p.y - 0.5f, z = p.z - 0.5f;
-    Int ix = to_int(x), iy = to_int(y), iz = to_int(z);
-    Real fx = x - to_real(ix), fy = y - to_real(iy), fz = z - to_real(iz);
+    Int ix = to_int(p.x), iy = to_int(p.y), iz = to_int(p.z);
+    Real fx = p.x - to_real(ix), fy = p.y - to_real(iy), fz = p.z - to_real(iz);
     int row = view->dims[0] * VOXEL_BYTES, sheet = view->dims[1] * row;
     Int at = ((iz * view->dims[1] + iy) * view->dims[0] + ix) * VOXEL_BYTES;
     Real near = lerp_x(voxels, at, fx), low = lerp_x(voxels + row, at, fx);
@@ -227,7 +260,11 @@ static inline Real inner_raw(constant const View *view, global const uchar *voxe
 }
 
 static inline Real inner_gradient(constant const View *view, global const uchar *voxels, Real3 p, Real3 *gradient) {
-    *gradient = gradient_raw(view, voxels, p);
+    *gradient = gradient_raw(view, voxels, real3(p.x + 0.5f, p.y + 0.5f, p.z + 0.5f));
     return inner_raw(view, voxels, p);
 }
 #endif
+
+// A place or a way in index units as inner_raw takes it: places count from the middle of voxel 0.
+static inline Real3 inner_way(Real3 way) { return real3(way.x * INNER_X, way.y * INNER_YZ, way.z * INNER_YZ); }
+static inline Real3 inner_place(Real3 p) { return inner_way(real3(p.x - 0.5f, p.y - 0.5f, p.z - 0.5f)); }
