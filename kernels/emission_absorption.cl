@@ -7,21 +7,35 @@ typedef struct { Real3 colour; Real alpha; } Optical;
 
 typedef struct { Real3 colour; Real transmittance; } Radiance;
 
-// An entry of the table is two words: the opacity's float less its ten lowest bits, which with the two highest (an opacity is
-// at most 1) hold the square root of blue; then red and green.
+// A colour is kept as 1 + channel * 65535/65536 (blue: 4095/4096): then its bits in the table are those of a float's fraction.
+// What is composited of it is too high by 1 - transmittance.
+#define CHANNEL(bits, mask) as_Real(((bits) & (mask)) | 0x3f800000)
+
+static inline Real3 decoded(Real3 colour, Real weight) {
+    return real3((colour.x - weight) * (65536.0f / 65535.0f), (colour.y - weight) * (65536.0f / 65535.0f), (colour.z - weight) * (4096.0f / 4095.0f));
+}
+
+static inline Real3 encoded(Real3 colour) {
+    return real3(mad(colour.x, (Real)(65535.0f / 65536.0f), (Real)(1.0f)), mad(colour.y, (Real)(65535.0f / 65536.0f), (Real)(1.0f)),
+                 mad(colour.z, (Real)(4095.0f / 4096.0f), (Real)(1.0f)));
+}
+
+// An entry of the table is two words: the opacity's float less its ten lowest bits, which hold the upper bits of blue, its two
+// lowest above (an opacity is at most 1); then 16 bits each of red and green, turned right by 25 and 9 bits.
 static inline Optical optical_entry(global const uchar *table, Int entry) {
     Optical o;
-    Int word = gather_words(table, entry << 3), red_green = gather_words(table + 4, entry << 3);
+    Int word, red_green;
+    gather_pairs(table, entry, &word, &red_green);
     o.alpha = as_Real(word & 0x3ffffc00);
-    Real root = to_real(as_Int(rotate(as_UInt(word), (UInt)(2u))) & 0xfff) * (1.0f / 4095.0f);
-    o.colour = real3(to_real(red_green & 0xffff) * (1.0f / 65535.0f), to_real(as_Int(as_UInt(red_green) >> 16)) * (1.0f / 65535.0f),
-                     root * root);
+    Int green = as_Int(rotate(as_UInt(red_green), (UInt)(16u))), blue = as_Int(rotate(as_UInt(word), (UInt)(13u)));
+    o.colour = real3(CHANNEL(red_green, 0x007fff80), CHANNEL(green, 0x007fff80), CHANNEL(blue, 0x007ff800));
     return o;
 }
 
-// The transfer function at a raw value, with the opacity of a whole step; a NaN is empty.
-static inline Optical classify(constant const EmissionAbsorption *params, global const uchar *table, Real raw) {
-    Real x = clamp(mad(raw, (Real)(params->table_scale), (Real)(params->table_offset)), (Real)(0.0f), (Real)(TABLE_SIZE - 1));
+// The transfer function at a raw value in units of `unit`, with the opacity of a whole step; a NaN is empty.
+static inline Optical classify(constant const EmissionAbsorption *params, global const uchar *table, Real raw, float unit) {
+    Real x = mad(raw, (Real)(params->table_scale * unit), (Real)(params->table_offset));
+    x = clamp(x, (Real)(0.0f), (Real)(TABLE_SIZE - 1));
 #if VOXEL == VOXEL_F32
     Mask nan = MASK(raw != raw);
     x = select(x, (Real)(0.0f), nan);
@@ -32,6 +46,13 @@ static inline Optical classify(constant const EmissionAbsorption *params, global
 #endif
     return o;
 }
+
+#if SHADED
+// The colour of a sample of gradient g, in index units, under the lights.
+static inline Real3 lit(constant const View *view, const Packet *p, Real3 g, Real3 colour) {
+    return encoded(shade(view, gradient_world(view, g), p->half_way, decoded(colour, (Real)(1.0f))));
+}
+#endif
 
 // Puts a sample behind (or, back to front, before) what is there, in the lanes whose ray has not ended.
 static inline void composite(constant const EmissionAbsorption *params, Optical o, Radiance *r) {
@@ -68,11 +89,11 @@ static inline void styled_step(constant const View *view, constant const Emissio
     if (!any_lane(inside)) return;
     Real3 at = along(p->ray.origin, p->ray.direction, t);
     Surface s = surface_at(view, params, voxels, at, ray_world(view, p->x, p->y), &raw);
-    Optical o = params->gradient_scale > 0.0f ? classify_2d(params, table, raw, s.magnitude) : classify(params, table, raw);
+    Optical o = params->gradient_scale > 0.0f ? classify_2d(params, table, raw, s.magnitude) : classify(params, table, raw, 1.0f);
     Real factor = extinction_factor(params, &s) * (length / view->step);
     o.alpha = select((Real)(0.0f), opacity_times(o.alpha, factor), inside & MASK(factor == factor));
     if (!any_lane(MASK(o.alpha > 0.0f))) return;
-    o.colour = styled_colour(view, params, &s, o.colour);
+    o.colour = encoded(styled_colour(view, params, &s, decoded(o.colour, (Real)(1.0f))));
     composite(params, o, r);
 }
 #endif
@@ -126,23 +147,34 @@ static inline void preintegrated_step(constant const View *view, constant const 
     o.colour = real3(between(table, 1, a, b, close) * inverse, between(table, 2, a, b, close) * inverse, between(table, 3, a, b, close) * inverse);
 #if SHADED
     Real3 at = along(p->ray.origin, p->ray.direction, 0.5f * (from + to));
-    o.colour = shade(view, gradient_world(view, gradient_raw(view, voxels, at)), ray_world(view, p->x, p->y), o.colour);
+    o.colour = shade(view, gradient_world(view, gradient_raw(view, voxels, at)), p->half_way, o.colour);
 #endif
+    o.colour = encoded(o.colour);
     composite(params, o, r);
+}
+#endif
+
+#if defined(NARROW) && !SHADED
+// inner_step of lanes that are close together.
+static inline void narrow_step(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
+                               global const uchar *table, const Packet *p, float k, Radiance *r) {
+    int4 first = convert_int4(p->low + p->low_pace * k);
+    Real raw = narrow_raw(view, voxels, along(p->start, p->pace, (Real)(k)), first);
+    composite(params, classify(params, table, raw, INNER_UNIT), r);
 }
 #endif
 
 // A whole step of every lane, away from the box's faces.
 static inline void inner_step(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
-                              global const uchar *table, const Packet *p, float t, Radiance *r) {
-    Real3 at = along(p->start, p->ray.direction, (Real)(t));
+                              global const uchar *table, const Packet *p, Real k, Radiance *r) {
+    Real3 at = along(p->start, p->pace, k);
 #if SHADED
     Real3 g;
-    Optical o = classify(params, table, inner_gradient(view, voxels, at, &g));
+    Optical o = classify(params, table, inner_gradient(view, voxels, at, &g), INNER_UNIT);
     if (!any_lane(MASK(o.alpha > 0.0f))) return;
-    o.colour = shade(view, gradient_world(view, g), ray_world(view, p->x, p->y), o.colour);
+    o.colour = lit(view, p, scale3(g, (Real)(INNER_UNIT)), o.colour);
 #else
-    Optical o = classify(params, table, inner_raw(view, voxels, at));
+    Optical o = classify(params, table, inner_raw(view, voxels, at), INNER_UNIT);
 #endif
     composite(params, o, r);
 }
@@ -154,26 +186,42 @@ static inline void edge_step(constant const View *view, constant const EmissionA
     Mask inside = edge_sample(view, p, k, &t, &length);
     if (!any_lane(inside)) return;
     Real3 at = along(p->ray.origin, p->ray.direction, t);
-    Optical o = classify(params, table, sample_raw(view, voxels, at));
+    Optical o = classify(params, table, sample_raw(view, voxels, at), 1.0f);
     Real part = opacity_times(o.alpha, length / view->step);
     o.alpha = select((Real)(0.0f), select(part, o.alpha, MASK(length >= view->step)), inside);
     if (!any_lane(MASK(o.alpha > 0.0f))) return;
 #if SHADED
-    o.colour = shade(view, gradient_world(view, gradient_raw(view, voxels, at)), ray_world(view, p->x, p->y), o.colour);
+    o.colour = lit(view, p, gradient_raw(view, voxels, at), o.colour);
 #endif
     composite(params, o, r);
 }
 
-static inline void step(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
-                        global const uchar *table, const Packet *p, int k, Radiance *r) {
+// The steps from k to end - 1 of a packet; what it gathers stays in registers meanwhile.
+static inline void march(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
+                         global const uchar *table, const Packet *p, int k, int end, Radiance *radiance) {
+    Radiance r = *radiance;
 #if PREINTEGRATED
-    preintegrated_step(view, params, voxels, table, p, k, r);
+    for (; k < end; k++) preintegrated_step(view, params, voxels, table, p, k, &r);
 #elif STYLED
-    styled_step(view, params, voxels, table, p, k, r);
-#else
-    if (k >= p->inner && k < p->inner_end) inner_step(view, params, voxels, table, p, (float)k * view->step, r);
-    else edge_step(view, params, voxels, table, p, k, r);
+    for (; k < end; k++) styled_step(view, params, voxels, table, p, k, &r);
 #endif
+    while (k < end) {
+#if defined(NARROW) && !SHADED
+        if (k >= p->inner && k < p->narrow_end) {
+            int to = min(end, p->narrow_end);
+            for (float at = (float)k; k < to; k++, at += 1.0f) narrow_step(view, params, voxels, table, p, at, &r);
+            continue;
+        }
+#endif
+        if (k >= p->inner && k < p->inner_end) {
+            int to = min(end, p->inner_end);
+            for (Real at = (Real)((float)k); k < to; k++, at += 1.0f) inner_step(view, params, voxels, table, p, at, &r);
+        } else {
+            int to = k < p->inner ? min(end, p->inner) : end;
+            for (; k < to; k++) edge_step(view, params, voxels, table, p, k, &r);
+        }
+    }
+    *radiance = r;
 }
 
 kernel void emission_absorption(constant View *view, constant EmissionAbsorption *params, VOLUME voxels,
@@ -186,10 +234,13 @@ kernel void emission_absorption(constant View *view, constant EmissionAbsorption
     for (int i = 0; i < PACKETS; i++) {
         r[i].colour = real3(0.0f, 0.0f, 0.0f);
         r[i].transmittance = (Real)(1.0f);
+#if SHADED
+        half_ways(view, ray_world(view, packets[i].x, packets[i].y), packets[i].half_way);
+#endif
     }
 #if BACK_TO_FRONT
     for (int k = beam.end - 1; k >= beam.begin; k--)
-        for (int i = 0; i < PACKETS; i++) step(view, params, voxels, table, &packets[i], k, &r[i]);
+        for (int i = 0; i < PACKETS; i++) march(view, params, voxels, table, &packets[i], k, k + 1, &r[i]);
 #else
     int going = (1 << PACKETS) - 1;
     for (int k = beam.begin; k < beam.end && going;) {
@@ -197,9 +248,9 @@ kernel void emission_absorption(constant View *view, constant EmissionAbsorption
         k += leap;
         if (leap > 0) continue;
         int end = min(k + STRIDE, beam.end);
-        for (; k < end; k++)
-            for (int i = 0; i < PACKETS; i++)
-                if (going >> i & 1) step(view, params, voxels, table, &packets[i], k, &r[i]);
+        for (int i = 0; i < PACKETS; i++)
+            if (going >> i & 1) march(view, params, voxels, table, &packets[i], k, end, &r[i]);
+        k = end;
         going = 0;
         for (int i = 0; i < PACKETS; i++) {
             Mask on = MASK(r[i].transmittance > params->transmittance_floor) & MASK(packets[i].ray.t_far > (float)k * view->step);
@@ -207,6 +258,9 @@ kernel void emission_absorption(constant View *view, constant EmissionAbsorption
         }
     }
 #endif
-    for (int i = 0; i < PACKETS; i++)
-        film_packet(view, film, counts, packets[i].column, packets[i].row, scale3(r[i].colour, (Real)(params->brightness)), 1.0f - r[i].transmittance);
+    for (int i = 0; i < PACKETS; i++) {
+        Real alpha = 1.0f - r[i].transmittance;
+        Real3 colour = scale3(decoded(r[i].colour, alpha), (Real)(params->brightness));
+        film_packet(view, film, counts, packets[i].column, packets[i].row, colour, alpha);
+    }
 }

@@ -65,13 +65,24 @@ static inline int any_lane(Mask m) { return any(m); }
 typedef union { Real v; float lane[LANES]; } RealLanes;
 typedef union { Int v; int lane[LANES]; } IntLanes;
 
+#if LANES == 1
+static inline float least_lane(Real v) { return v; }
+#else
 static inline float least_lane(Real v) {
-    RealLanes l;
-    l.v = v;
-    float least = l.lane[0];
-    for (int i = 1; i < LANES; i++) least = l.lane[i] < least ? l.lane[i] : least;
-    return least;
+    #define LESSER(a, b) ((a) < (b) ? (a) : (b))
+#if LANES == 16
+    float8 eight = LESSER(v.lo, v.hi);
+    float4 four = LESSER(eight.lo, eight.hi);
+#elif LANES == 8
+    float4 four = LESSER(v.lo, v.hi);
+#else
+    float4 four = v;
+#endif
+    float2 two = LESSER(four.lo, four.hi);
+    return LESSER(two.x, two.y);
+    #undef LESSER
 }
+#endif
 
 static inline float greatest_lane(Real v) { return -least_lane(-v); }
 
@@ -102,6 +113,19 @@ static inline Int gather_words(global const uchar *base, Int byte_offset) {
 #endif
 #endif
 
+// The two words of the pair `index` a lane: on AVX-512 with half the loads of two gathers.
+static inline void gather_pairs(global const uchar *pairs, Int index, Int *first, Int *second) {
+#if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_gathersiv8di)
+    long8 low = __builtin_ia32_gathersiv8di((long8)(0), (const void *)(size_t)pairs, index.lo, (char)-1, 8);
+    long8 high = __builtin_ia32_gathersiv8di((long8)(0), (const void *)(size_t)pairs, index.hi, (char)-1, 8);
+    *first = (Int)(as_int16(low).even, as_int16(high).even);
+    *second = (Int)(as_int16(low).odd, as_int16(high).odd);
+#else
+    *first = gather_words(pairs, index * 8);
+    *second = gather_words(pairs + 4, index * 8);
+#endif
+}
+
 static inline Int gather_ints(global const int *base, Int index) {
 #if LANES == 1
     return base[index];
@@ -130,4 +154,29 @@ static inline Real3 along(Real3 origin, Real3 direction, Real t) {
 static inline Real dot3(Real3 a, Real3 b) { return mad(a.x, b.x, mad(a.y, b.y, a.z * b.z)); }
 static inline Real3 select3(Real3 no, Real3 yes, Mask m) {
     return real3(select(no.x, yes.x, m), select(no.y, yes.y, m), select(no.z, yes.z, m));
+}
+
+// 1 / sqrt(v): an estimate and a Newton step are half the work of the root and the division.
+#if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_rsqrt14ps512_mask)
+static inline Real inverse_root(Real v) {
+    Real r = __builtin_ia32_rsqrt14ps512_mask(v, (Real)(0.0f), (short)-1);
+    return r * mad(-0.5f * v * r, r, (Real)(1.5f));
+}
+#else
+static inline Real inverse_root(Real v) { return rsqrt(v); }
+#endif
+
+// x^y for x in (0, 1] and y >= 0, to 2e-6 max(1, y): polynomials, as a library's log2 and exp2 are calls that spill.
+static inline Real power(Real x, float y) {
+    Int bits = as_Int(x) - 0x3f3504f3; // the mantissa counted from sqrt(1/2)
+    Real m = as_Real((bits & 0x7fffff) + 0x3f3504f3) - 1.0f;
+    Real log = mad(m, mad(m, mad(m, mad(m, mad(m, mad(m, (Real)(0.17212873f), (Real)(-0.26950627f)), (Real)(0.2956336f)),
+        (Real)(-0.35935065f)), (Real)(0.48062915f)), (Real)(-0.72136404f)), (Real)(1.4426964f));
+    Real e = mad(m, log, to_real(bits >> 23)) * y;
+    e = select((Real)(-126.0f), e, MASK(e > -126.0f));
+    Int whole = to_int(e);
+    Real f = e - to_real(whole);
+    Real part = mad(f, mad(f, mad(f, mad(f, (Real)(0.0068419914f), (Real)(0.053226834f)), (Real)(0.23943921f)), (Real)(0.69305067f)),
+        (Real)(0.99999809f));
+    return as_Real(as_Int(part) + (whole << 23));
 }

@@ -14,14 +14,23 @@
 // Samples between two looks at the cells and at which packets are still going.
 #define STRIDE 4
 
+#define MAX_LIGHTS 4
+
 typedef struct {
     Int column, row;      // in this pass's pixels
     Mask inside;          // the picture
     Real x, y;            // image point in full-size pixels
     Ray ray;              // t_near > t_far where it misses
     Real jitter;
-    Real3 start;          // index position of sample k is start + direction (k h)
+    Real3 start, pace;    // sample k is at start + k pace, as inner_raw takes it
     int inner, inner_end; // steps in which every lane takes its whole sample, away from the box's faces by the margin
+#if SHADED
+    Real3 half_way[MAX_LIGHTS]; // between the ray and each light
+#endif
+#ifdef NARROW
+    float4 low, low_pace; // no lane's sample k is below low + k low_pace, in voxels from the middle of voxel 0
+    int narrow_end;       // before it the lanes' samples of a step are within NARROW voxels of each other
+#endif
 } Packet;
 
 typedef struct {
@@ -36,6 +45,30 @@ static inline int beams(constant const View *view) {
     return ((view->width + w - 1) / w) * ((view->height + h - 1) / h);
 }
 
+#ifdef NARROW
+// The least of linear functions lies above its chord, the greatest below.
+static inline void narrow_range(Packet *p) {
+    float from = (float)p->inner, steps = (float)max(p->inner_end - p->inner, 1), room = steps;
+    float low[3], pace[3];
+    #define AXIS(i, c, scale)                                                                                              \
+        {                                                                                                                  \
+            Real a = p->start.c + p->pace.c * from, b = a + p->pace.c * steps;                                             \
+            float low_a = least_lane(a), low_b = least_lane(b), wide_a = greatest_lane(a) - low_a, wide_b = greatest_lane(b) - low_b; \
+            float spare = NARROW * scale - wide_a, growth = (wide_b - wide_a) / steps;                                     \
+            pace[i] = (low_b - low_a) / (steps * scale);                                                                   \
+            low[i] = low_a / scale - pace[i] * from - 0.01f;                                                               \
+            room = spare < 0.0f ? 0.0f : growth * room > spare ? spare / growth : room;                                    \
+        }
+    AXIS(0, x, INNER_X)
+    AXIS(1, y, 1.0f)
+    AXIS(2, z, 1.0f)
+    #undef AXIS
+    p->low = (float4)(low[0], low[1], low[2], 0.0f);
+    p->low_pace = (float4)(pace[0], pace[1], pace[2], 0.0f);
+    p->narrow_end = min(p->inner + (int)room, p->inner_end);
+}
+#endif
+
 static inline Packet packet_at(constant const View *view, int left, int top, float margin) {
     Packet p;
     p.column = left + LANE_IDS % TILE_W;
@@ -47,12 +80,16 @@ static inline Packet packet_at(constant const View *view, int left, int top, flo
     p.x = to_real(column) + view->offset[0];
     p.y = to_real(row) + view->offset[1];
     p.ray = camera_ray(view, p.x, p.y);
-    p.start = along(p.ray.origin, p.ray.direction, p.jitter * view->step);
+    p.start = inner_place(along(p.ray.origin, p.ray.direction, p.jitter * view->step));
+    p.pace = inner_way(scale3(p.ray.direction, (Real)(view->step)));
     Ray inner = p.ray;
     clip_box(view, margin, &inner);
     float from = greatest_lane(inner.t_near) / view->step, to = least_lane(inner.t_far) / view->step;
     p.inner = (int)ceil(clamp(from, -1e8f, 1e8f));
     p.inner_end = (int)floor(clamp(to, -1e8f, 1e8f));
+#ifdef NARROW
+    narrow_range(&p);
+#endif
     return p;
 }
 

@@ -7,21 +7,28 @@ static inline Real3 gradient_world(constant const View *view, Real3 g) {
                  mad(m[6], g.x, mad(m[7], g.y, m[8] * g.z)));
 }
 
-// `colour` as lit on the world gradient n; `ray` is the unit direction of the ray. Where the field is flat there is no surface
-// to turn towards the light: full diffuse, no highlight.
-static inline Real3 shade(constant const View *view, Real3 n, Real3 ray, Real3 colour) {
+// What is constant along a ray of unit direction `ray`: for each light the unit vector half way to it.
+static inline void half_ways(constant const View *view, Real3 ray, Real3 half_way[MAX_LIGHTS]) {
+    for (int i = 0; i < view->lights; i++) {
+        constant const float *d = view->light_direction + 3 * i;
+        Real3 h = real3(d[0] - ray.x, d[1] - ray.y, d[2] - ray.z);
+        half_way[i] = scale3(h, rsqrt(fmax(dot3(h, h), (Real)(1e-12f))));
+    }
+}
+
+// `colour` as lit on the world gradient n. Where the field is flat there is no surface to turn towards the light: full diffuse,
+// no highlight.
+static inline Real3 shade(constant const View *view, Real3 n, const Real3 half_way[MAX_LIGHTS], Real3 colour) {
     Real squared = dot3(n, n);
     Mask flat = MASK(!(squared > view->flat_squared));
-    Real scale = select(rsqrt(squared), (Real)(0.0f), flat);
+    Real scale = select(inverse_root(squared), (Real)(0.0f), flat);
     Real3 body = real3(view->ambient, view->ambient, view->ambient), shine = real3(0.0f, 0.0f, 0.0f);
     for (int i = 0; i < view->lights; i++) {
         constant const float *d = view->light_direction + 3 * i, *c = view->light_color + 3 * i;
         Real facing = fabs(mad(n.x, d[0], mad(n.y, d[1], n.z * d[2]))) * scale;
-        Real3 h = real3(d[0] - ray.x, d[1] - ray.y, d[2] - ray.z);
-        Real half_length = rsqrt(fmax(dot3(h, h), (Real)(1e-12f)));
-        Real along_half = fmin(fabs(dot3(n, h)) * scale * half_length, (Real)(1.0f));
+        Real along_half = fmin(fabs(dot3(n, half_way[i])) * scale, (Real)(1.0f));
         Real lambert = view->diffuse * select(facing, (Real)(1.0f), flat);
-        Real glint = view->specular * exp2(view->shininess * log2(fmax(along_half, (Real)(1e-6f))));
+        Real glint = view->specular * power(fmax(along_half, (Real)(1e-6f)), view->shininess);
         glint = select(glint, (Real)(0.0f), flat);
         body = real3(mad(lambert, c[0], body.x), mad(lambert, c[1], body.y), mad(lambert, c[2], body.z));
         shine = real3(mad(glint, c[0], shine.x), mad(glint, c[1], shine.y), mad(glint, c[2], shine.z));

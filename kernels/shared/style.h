@@ -98,7 +98,11 @@ static inline Real3 styled_colour(constant const View *view, constant const Emis
     if (params->curvature_full > 0.0f) colour = colour_by_curvature(params, s, colour);
     if (params->toned) return tone(view, params, s, colour);
     if (params->translucency > 0.0f) return shade_translucent(view, params, s, colour);
-    if (params->lit) return shade(view, s->gradient, s->ray, colour);
+    if (params->lit) {
+        Real3 half_way[MAX_LIGHTS];
+        half_ways(view, s->ray, half_way);
+        return shade(view, s->gradient, half_way, colour);
+    }
     return colour;
 }
 #endif

@@ -164,83 +164,110 @@ static inline Real3 gradient_raw(constant const View *view, VOLUME voxels, Real3
     return scale3(g, (Real)(0.5f));
 }
 
-// What follows is for packets whose lanes are all at least INNER_MARGIN voxels away from the box's faces: no clamps, and for
-// 8-bit voxels on AVX-512 an interpolation in 16-bit integers, two neighbours in x side by side, weights of 15 bits, values
-// of 7 fractional bits: within 2^-7 of a grey level of the exact one.
+// What follows is for packets whose lanes are all at least INNER_MARGIN voxels away from the box's faces: no clamps. A place is
+// given by inner_place, and values are in units of INNER_UNIT. For 8-bit voxels on AVX-512 two neighbours in x are weighed side
+// by side in 16-bit integers, with weights of 15 bits: exact to 2^-15 of their difference.
 #define INNER_MARGIN 1.51f
 
-#if INTERPOLATION == TRILINEAR && LANES == 16 && VOXEL == VOXEL_U8 && defined(__AVX512BW__) && __has_builtin(__builtin_ia32_pmulhrsw512)
-#define INTEGER_LERP 1
+#if INTERPOLATION == TRILINEAR && LANES == 16 && VOXEL == VOXEL_U8 && defined(__AVX512BW__) && __has_builtin(__builtin_ia32_pmaddwd512)
 typedef short Words __attribute__((ext_vector_type(32)));
-typedef ushort UWords __attribute__((ext_vector_type(32)));
 typedef char Bytes __attribute__((ext_vector_type(64)));
 #define AS_WORDS(v) __builtin_astype(v, Words)
 #define FOUR(a, b, c, d) ((Int)(a, b, c, d, a, b, c, d, a, b, c, d, a, b, c, d))
 #define SHUFFLE(v, order) __builtin_astype(__builtin_ia32_pshufb512(__builtin_astype(v, Bytes), __builtin_astype(order, Bytes)), Words)
-// The bytes n and n + 1 of each lane as two words of 7 fractional bits.
-#define PAIR(v, n) (SHUFFLE(v, FOUR(0x80018000 + (n) * 0x10001, 0x80058004 + (n) * 0x10001, 0x80098008 + (n) * 0x10001, \
-                                    0x800d800c + (n) * 0x10001)) << (Words)(7))
-#define WEIGH(a, b, f) ((a) + __builtin_ia32_pmulhrsw512((b) - (a), f))
-#define INNER_UNIT (1.0f / (128.0f * 32767.0f))
+// The bytes n and n + 1 of each lane as two words.
+#define PAIR_ORDER FOUR(0x80018000, 0x80058004, 0x80098008, 0x800d800c)
+#define PAIR(v, n) SHUFFLE(v, PAIR_ORDER + (n) * 0x10001)
+// The low word of each lane in both.
+#define BOTH(v) SHUFFLE(v, FOUR(0x01000100, 0x05040504, 0x09080908, 0x0d0c0d0c))
+#define MULTIPLY_ADD(a, b) __builtin_astype(__builtin_ia32_pmaddwd512(a, b), Int)
+#define LERP(a, b, f) mad((b) - (a), f, a)
+#define INNER_UNIT (1.0f / 32767.0f)
+// A place comes with 15 binary places in x, where the integers want them.
+#define INNER_X 32768.0f
 
-typedef struct { Int at; Words x, y, z; } Inner; // byte offset of the lowest corner, weights
+typedef struct { Int x, y, z; Words weights; Real fy, fz; } Inner; // lowest corner in whole voxels; (1 - fx, fx)
 
-// The low 16 bits of each lane, halved, in both words.
-static inline Words fraction_words(Int fixed) {
-    Words both = SHUFFLE(fixed, FOUR(0x01000100, 0x05040504, 0x09080908, 0x0d0c0d0c));
-    return AS_WORDS(__builtin_astype(both, UWords) >> (UWords)(1));
-}
-
-static inline Inner inner_at(constant const View *view, Real3 p) {
-    Int x = to_int(mad(p.x, 65536.0f, -32768.0f)), y = to_int(mad(p.y, 65536.0f, -32768.0f)), z = to_int(mad(p.z, 65536.0f, -32768.0f));
+static inline Inner inner_at(Real3 p) {
     Inner i;
-    i.at = ((z >> 16) * view->dims[1] + (y >> 16)) * view->dims[0] + (x >> 16);
-    i.x = AS_WORDS(__builtin_astype(fraction_words(x), Int) ^ (Int)(0x7fff)); // (1 - f, f)
-    i.y = fraction_words(y);
-    i.z = fraction_words(z);
+    Int x = to_int(p.x), f = __builtin_astype(BOTH(x), Int);
+    // (f & 0x7fff7fff) ^ 0x7fff in one instruction
+    i.weights = AS_WORDS(__builtin_ia32_pternlogd512_mask(f, (Int)(0x7fff7fff), (Int)(0x7fff), 0x6a, (short)-1));
+    i.x = x >> 15, i.y = to_int(p.y), i.z = to_int(p.z);
+    i.fy = p.y - to_real(i.y), i.fz = p.z - to_real(i.z);
     return i;
 }
 
-static inline Real across(Words pair, Words weights) {
-    return to_real(__builtin_astype(__builtin_ia32_pmaddwd512(pair, weights), Int)) * INNER_UNIT;
+static inline Int inner_offset(constant const View *view, Inner i) {
+    return (MULTIPLY_ADD(AS_WORDS(i.z), AS_WORDS((Int)(view->dims[1]))) + i.y) * view->dims[0] + i.x;
 }
+
+#define ACROSS(pair, i) to_real(MULTIPLY_ADD(pair, (i).weights))
 
 static inline Real inner_raw(constant const View *view, VOLUME voxels, Real3 p) {
-    Inner i = inner_at(view, p);
+    Inner i = inner_at(p);
+    Int at = inner_offset(view, i);
     int row = view->dims[0], sheet = view->dims[0] * view->dims[1];
-    Int a = gather_words(voxels, i.at), b = gather_words(voxels + row, i.at);
-    Int c = gather_words(voxels + sheet, i.at), d = gather_words(voxels + sheet + row, i.at);
-    Words near = WEIGH(PAIR(a, 0), PAIR(c, 0), i.z), far = WEIGH(PAIR(b, 0), PAIR(d, 0), i.z);
-    return across(WEIGH(near, far, i.y), i.x);
+    Real a = ACROSS(PAIR(gather_words(voxels, at), 0), i), b = ACROSS(PAIR(gather_words(voxels + row, at), 0), i);
+    Real c = ACROSS(PAIR(gather_words(voxels + sheet, at), 0), i), d = ACROSS(PAIR(gather_words(voxels + sheet + row, at), 0), i);
+    Real near = LERP(a, c, i.fz), far = LERP(b, d, i.fz);
+    return LERP(near, far, i.fy);
 }
 
-// Twelve gathers instead of the 28 of seven values: a gather of four voxels in x serves three of them, and rows are shared.
+// The same where all lanes are within NARROW voxels of each other: the block of 4 x 4 x 4 voxels from `first` on, which is at
+// most the lanes' least place, comes with one gather, a row a lane, and is read by permutations.
+#define NARROW 1.98f
+
+static inline Real narrow_raw(constant const View *view, VOLUME voxels, Real3 p, int4 first) {
+    int row = view->dims[0], sheet = view->dims[0] * view->dims[1];
+    first = min(first, (int4)(row, view->dims[1], view->dims[2], 4) - 4);
+    global const uchar *corner = voxels + ((size_t)first.z * sheet + first.y * row + first.x);
+    Int block = gather_words(corner, (LANE_IDS & 3) * row + (LANE_IDS >> 2) * sheet);
+    Inner i = inner_at(p);
+    Int at = (i.z << 2) + i.y - (first.z * 4 + first.y);
+    Int order = __builtin_astype(BOTH(i.x), Int) + (PAIR_ORDER - first.x * 0x10001);
+    #define ROW(n) ACROSS(SHUFFLE(__builtin_ia32_permvarsi512(block, at + (n)), order), i)
+    Real a = ROW(0), b = ROW(1), c = ROW(4), d = ROW(5);
+    #undef ROW
+    Real near = LERP(a, c, i.fz), far = LERP(b, d, i.fz);
+    return LERP(near, far, i.fy);
+}
+
+// Value and gradient by central differences, in units of INNER_UNIT a voxel. Twelve gathers instead of the 28 of seven values: a
+// gather of four voxels in x serves three of them, and rows are shared.
 static inline Real inner_gradient(constant const View *view, VOLUME voxels, Real3 p, Real3 *gradient) {
-    Inner i = inner_at(view, p);
+    Inner i = inner_at(p);
+    Int at = inner_offset(view, i);
     int row = view->dims[0], sheet = view->dims[0] * view->dims[1];
     global const uchar *from = voxels - 1; // the lanes are a voxel or more inside
-    #define ROW(y, z) gather_words(from + ((y) * row + (z) * sheet), i.at)
-    Int a = ROW(0, 0), b = ROW(1, 0), c = ROW(0, 1), d = ROW(1, 1);
-    Words a1 = PAIR(a, 1), b1 = PAIR(b, 1), c1 = PAIR(c, 1), d1 = PAIR(d, 1);
-    Words left = WEIGH(PAIR(a, 2) - PAIR(a, 0), PAIR(c, 2) - PAIR(c, 0), i.z), right = WEIGH(PAIR(b, 2) - PAIR(b, 0), PAIR(d, 2) - PAIR(d, 0), i.z);
-    gradient->x = 0.5f * across(WEIGH(left, right, i.y), i.x);
-    Words y0 = WEIGH(a1, c1, i.z), y1 = WEIGH(b1, d1, i.z);
-    Words before = WEIGH(PAIR(ROW(-1, 0), 1), PAIR(ROW(-1, 1), 1), i.z), after = WEIGH(PAIR(ROW(2, 0), 1), PAIR(ROW(2, 1), 1), i.z);
-    gradient->y = 0.5f * across(WEIGH(y1 - before, after - y0, i.y), i.x);
-    Words z0 = WEIGH(a1, b1, i.y), z1 = WEIGH(c1, d1, i.y);
-    before = WEIGH(PAIR(ROW(0, -1), 1), PAIR(ROW(1, -1), 1), i.y), after = WEIGH(PAIR(ROW(0, 2), 1), PAIR(ROW(1, 2), 1), i.y);
-    gradient->z = 0.5f * across(WEIGH(z1 - before, after - z0, i.z), i.x);
+    #define ROW(y, z) gather_words(from + ((y) * row + (z) * sheet), at)
+    #define SLOPE(v) ACROSS(PAIR(v, 2) - PAIR(v, 0), i)
+    Int va = ROW(0, 0), vb = ROW(1, 0), vc = ROW(0, 1), vd = ROW(1, 1);
+    Real near = LERP(SLOPE(va), SLOPE(vc), i.fz), far = LERP(SLOPE(vb), SLOPE(vd), i.fz);
+    gradient->x = 0.5f * LERP(near, far, i.fy);
+    #define LINE(y, z) ACROSS(PAIR(ROW(y, z), 1), i)
+    Real a = ACROSS(PAIR(va, 1), i), b = ACROSS(PAIR(vb, 1), i), c = ACROSS(PAIR(vc, 1), i), d = ACROSS(PAIR(vd, 1), i);
+    Real y0 = LERP(a, c, i.fz), y1 = LERP(b, d, i.fz);
+    Real before = LERP(LINE(-1, 0), LINE(-1, 1), i.fz), after = LERP(LINE(2, 0), LINE(2, 1), i.fz);
+    gradient->y = 0.5f * (LERP(y1, after, i.fy) - LERP(before, y0, i.fy));
+    Real z0 = LERP(a, b, i.fy), z1 = LERP(c, d, i.fy);
+    before = LERP(LINE(0, -1), LINE(1, -1), i.fy), after = LERP(LINE(0, 2), LINE(1, 2), i.fy);
+    gradient->z = 0.5f * (LERP(z1, after, i.fz) - LERP(before, z0, i.fz));
     #undef ROW
-    return across(WEIGH(y0, y1, i.y), i.x);
+    #undef SLOPE
+    #undef LINE
+    return LERP(y0, y1, i.fy);
 }
 #else
+#define INNER_UNIT 1.0f
+#define INNER_X 1.0f
+
 static inline Real inner_raw(constant const View *view, VOLUME voxels, Real3 p) {
 #if INTERPOLATION != TRILINEAR || VOLUMES_ARE_IMAGES
-    return sample_raw(view, voxels, p);
+    return sample_raw(view, voxels, real3(p.x + 0.5f, p.y + 0.5f, p.z + 0.5f));
 #else
-    Real x = p.x - 0.5f, y = p.y - 0.5f, z = p.z - 0.5f;
-    Int ix = to_int(x), iy = to_int(y), iz = to_int(z);
-    Real fx = x - to_real(ix), fy = y - to_real(iy), fz = z - to_real(iz);
+    Int ix = to_int(p.x), iy = to_int(p.y), iz = to_int(p.z);
+    Real fx = p.x - to_real(ix), fy = p.y - to_real(iy), fz = p.z - to_real(iz);
     int row = view->dims[0] * VOXEL_BYTES, sheet = view->dims[1] * row;
     Int at = ((iz * view->dims[1] + iy) * view->dims[0] + ix) * VOXEL_BYTES;
     Real near = lerp_x(voxels, at, fx), low = lerp_x(voxels + row, at, fx);
@@ -251,7 +278,11 @@ static inline Real inner_raw(constant const View *view, VOLUME voxels, Real3 p) 
 }
 
 static inline Real inner_gradient(constant const View *view, VOLUME voxels, Real3 p, Real3 *gradient) {
-    *gradient = gradient_raw(view, voxels, p);
+    *gradient = gradient_raw(view, voxels, real3(p.x + 0.5f, p.y + 0.5f, p.z + 0.5f));
     return inner_raw(view, voxels, p);
 }
 #endif
+
+// A place or a way in index units as inner_raw takes it: places count from the middle of voxel 0.
+static inline Real3 inner_way(Real3 way) { return real3(way.x * INNER_X, way.y, way.z); }
+static inline Real3 inner_place(Real3 p) { return inner_way(real3(p.x - 0.5f, p.y - 0.5f, p.z - 0.5f)); }

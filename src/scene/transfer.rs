@@ -259,13 +259,13 @@ impl TransferFunction {
     }
 }
 
-/// A colour and an opacity in two words: the float of the opacity, rounded to 13 bits after the point, and in its ten lowest and
-/// two highest bits the square root of blue; then red and green.
+/// A colour and an opacity in two words: the float of the opacity, rounded to 13 bits after the point, with blue in its ten
+/// lowest and two highest bits; then red and green, turned to where a float's fraction has them.
 pub(crate) fn pack(color: [f64; 3], opacity: f64) -> [u32; 2] {
     let bits = |c: f64, most: f64| (c.clamp(0.0, 1.0) * most).round() as u32;
-    let root = bits(color[2].max(0.0).sqrt(), 4095.0);
+    let [red, green, blue] = [bits(color[0], 65535.0), bits(color[1], 65535.0), bits(color[2], 4095.0)];
     let opacity = ((opacity.clamp(0.0, 1.0) as f32).to_bits() + 0x200) & 0x3fff_fc00;
-    [opacity | root >> 2 | root << 30, bits(color[0], 65535.0) | bits(color[1], 65535.0) << 16]
+    [opacity | blue >> 2 | blue << 30, red << 7 | green >> 9 | green << 23]
 }
 
 fn evaluate_points(points: &[ControlPoint], value: f64) -> ([f64; 3], f64) {
