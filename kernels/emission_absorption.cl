@@ -12,7 +12,8 @@ typedef struct { Real3 colour; Real transmittance; } Radiance;
 #define CHANNEL(bits, mask) as_Real(((bits) & (mask)) | 0x3f800000)
 
 static inline Real3 decoded(Real3 colour, Real weight) {
-    return real3((colour.x - weight) * (65536.0f / 65535.0f), (colour.y - weight) * (65536.0f / 65535.0f), (colour.z - weight) * (4096.0f / 4095.0f));
+    Real3 c = real3(fmax(colour.x - weight, (Real)(0.0f)), fmax(colour.y - weight, (Real)(0.0f)), fmax(colour.z - weight, (Real)(0.0f)));
+    return real3(c.x * (65536.0f / 65535.0f), c.y * (65536.0f / 65535.0f), c.z * (4096.0f / 4095.0f));
 }
 
 static inline Real3 encoded(Real3 colour) {

@@ -165,55 +165,76 @@ static inline Real3 gradient_raw(constant const View *view, VOLUME voxels, Real3
 }
 
 // What follows is for packets whose lanes are all at least INNER_MARGIN voxels away from the box's faces: no clamps. A place is
-// given by inner_place, and values are in units of INNER_UNIT. For 8-bit voxels on AVX-512 two neighbours in x are weighed side
-// by side in 16-bit integers, with weights of 15 bits: exact to 2^-15 of their difference.
+// given by inner_place, and values are in units of INNER_UNIT. Bytes are weighed along x in whole numbers, with weights of 15
+// bits: exact to 2^-15 of their difference, and the same to the last bit for any number of lanes.
 #define INNER_MARGIN 1.51f
 
-#if INTERPOLATION == TRILINEAR && LANES == 16 && VOXEL == VOXEL_U8 && defined(__AVX512BW__) && __has_builtin(__builtin_ia32_pmaddwd512)
+#if INTERPOLATION == TRILINEAR && VOXEL == VOXEL_U8 && !VOLUMES_ARE_IMAGES
+#define LERP(a, b, f) mad((b) - (a), f, a)
+#define INNER_UNIT (1.0f / 32767.0f)
+// A place comes with 15 binary places in x.
+#define INNER_X 32768.0f
+
+#if LANES == 16 && defined(__AVX512BW__) && __has_builtin(__builtin_ia32_pmaddwd512)
 typedef short Words __attribute__((ext_vector_type(32)));
 typedef char Bytes __attribute__((ext_vector_type(64)));
+typedef Words Weights;
 #define AS_WORDS(v) __builtin_astype(v, Words)
 #define FOUR(a, b, c, d) ((Int)(a, b, c, d, a, b, c, d, a, b, c, d, a, b, c, d))
 #define SHUFFLE(v, order) __builtin_astype(__builtin_ia32_pshufb512(__builtin_astype(v, Bytes), __builtin_astype(order, Bytes)), Words)
-// The bytes n and n + 1 of each lane as two words.
+#define MULTIPLY_ADD(a, b) __builtin_astype(__builtin_ia32_pmaddwd512(a, b), Int)
+// The bytes 0 and 1 of each lane as two words.
 #define PAIR_ORDER FOUR(0x80018000, 0x80058004, 0x80098008, 0x800d800c)
-#define PAIR(v, n) SHUFFLE(v, PAIR_ORDER + (n) * 0x10001)
 // The low word of each lane in both.
 #define BOTH(v) SHUFFLE(v, FOUR(0x01000100, 0x05040504, 0x09080908, 0x0d0c0d0c))
-#define MULTIPLY_ADD(a, b) __builtin_astype(__builtin_ia32_pmaddwd512(a, b), Int)
-#define LERP(a, b, f) mad((b) - (a), f, a)
-#define INNER_UNIT (1.0f / 32767.0f)
-// A place comes with 15 binary places in x, where the integers want them.
-#define INNER_X 32768.0f
 
-typedef struct { Int x, y, z; Words weights; Real fy, fz; } Inner; // lowest corner in whole voxels; (1 - fx, fx)
+static inline Weights weights_x(Int x) {
+    // (1 - f, f) as words: (f & 0x7fff7fff) ^ 0x7fff in one instruction
+    Int f = __builtin_astype(BOTH(x), Int);
+    return AS_WORDS(__builtin_ia32_pternlogd512_mask(f, (Int)(0x7fff7fff), (Int)(0x7fff), 0x6a, (short)-1));
+}
+
+// The bytes n and n + 1 of each lane's word, weighed.
+static inline Int weigh(Int word, int n, Weights w) { return MULTIPLY_ADD(SHUFFLE(word, PAIR_ORDER + n * 0x10001), w); }
+
+static inline Int product(Int small, int factor) { return MULTIPLY_ADD(AS_WORDS(small), AS_WORDS((Int)(factor))); }
+#else
+typedef Int Weights;
+static inline Weights weights_x(Int x) { return x & 0x7fff; }
+static inline Int weigh(Int word, int n, Weights f) {
+    Int a = (word >> (8 * n)) & 0xff, b = (word >> (8 * n + 8)) & 0xff;
+    return a * 32767 + (b - a) * f;
+}
+static inline Int product(Int small, int factor) { return small * factor; }
+#endif
+
+typedef struct { Int x, y, z; Weights weights; Real fy, fz; } Inner; // lowest corner in whole voxels
 
 static inline Inner inner_at(Real3 p) {
     Inner i;
-    Int x = to_int(p.x), f = __builtin_astype(BOTH(x), Int);
-    // (f & 0x7fff7fff) ^ 0x7fff in one instruction
-    i.weights = AS_WORDS(__builtin_ia32_pternlogd512_mask(f, (Int)(0x7fff7fff), (Int)(0x7fff), 0x6a, (short)-1));
+    Int x = to_int(p.x);
+    i.weights = weights_x(x);
     i.x = x >> 15, i.y = to_int(p.y), i.z = to_int(p.z);
     i.fy = p.y - to_real(i.y), i.fz = p.z - to_real(i.z);
     return i;
 }
 
 static inline Int inner_offset(constant const View *view, Inner i) {
-    return (MULTIPLY_ADD(AS_WORDS(i.z), AS_WORDS((Int)(view->dims[1]))) + i.y) * view->dims[0] + i.x;
+    return (product(i.z, view->dims[1]) + i.y) * view->dims[0] + i.x;
 }
-
-#define ACROSS(pair, i) to_real(MULTIPLY_ADD(pair, (i).weights))
 
 static inline Real inner_raw(constant const View *view, VOLUME voxels, Real3 p) {
     Inner i = inner_at(p);
     Int at = inner_offset(view, i);
     int row = view->dims[0], sheet = view->dims[0] * view->dims[1];
-    Real a = ACROSS(PAIR(gather_words(voxels, at), 0), i), b = ACROSS(PAIR(gather_words(voxels + row, at), 0), i);
-    Real c = ACROSS(PAIR(gather_words(voxels + sheet, at), 0), i), d = ACROSS(PAIR(gather_words(voxels + sheet + row, at), 0), i);
+    #define LINE(step) to_real(weigh(gather_words(voxels + (step), at), 0, i.weights))
+    Real a = LINE(0), b = LINE(row), c = LINE(sheet), d = LINE(sheet + row);
+    #undef LINE
     Real near = LERP(a, c, i.fz), far = LERP(b, d, i.fz);
     return LERP(near, far, i.fy);
 }
 
+#if LANES == 16 && defined(__AVX512BW__) && __has_builtin(__builtin_ia32_pmaddwd512)
 // The same where all lanes are within NARROW voxels of each other: the block of 4 x 4 x 4 voxels from `first` on, which is at
 // most the lanes' least place, comes with one gather, a row a lane, and is read by permutations.
 #define NARROW 1.98f
@@ -226,12 +247,13 @@ static inline Real narrow_raw(constant const View *view, VOLUME voxels, Real3 p,
     Inner i = inner_at(p);
     Int at = (i.z << 2) + i.y - (first.z * 4 + first.y);
     Int order = __builtin_astype(BOTH(i.x), Int) + (PAIR_ORDER - first.x * 0x10001);
-    #define ROW(n) ACROSS(SHUFFLE(__builtin_ia32_permvarsi512(block, at + (n)), order), i)
-    Real a = ROW(0), b = ROW(1), c = ROW(4), d = ROW(5);
-    #undef ROW
+    #define LINE(n) to_real(MULTIPLY_ADD(SHUFFLE(__builtin_ia32_permvarsi512(block, at + (n)), order), i.weights))
+    Real a = LINE(0), b = LINE(1), c = LINE(4), d = LINE(5);
+    #undef LINE
     Real near = LERP(a, c, i.fz), far = LERP(b, d, i.fz);
     return LERP(near, far, i.fy);
 }
+#endif
 
 // Value and gradient by central differences, in units of INNER_UNIT a voxel. Twelve gathers instead of the 28 of seven values: a
 // gather of four voxels in x serves three of them, and rows are shared.
@@ -241,17 +263,17 @@ static inline Real inner_gradient(constant const View *view, VOLUME voxels, Real
     int row = view->dims[0], sheet = view->dims[0] * view->dims[1];
     global const uchar *from = voxels - 1; // the lanes are a voxel or more inside
     #define ROW(y, z) gather_words(from + ((y) * row + (z) * sheet), at)
-    #define SLOPE(v) ACROSS(PAIR(v, 2) - PAIR(v, 0), i)
+    #define SLOPE(v) to_real(weigh(v, 2, i.weights) - weigh(v, 0, i.weights))
+    #define LINE(v) to_real(weigh(v, 1, i.weights))
     Int va = ROW(0, 0), vb = ROW(1, 0), vc = ROW(0, 1), vd = ROW(1, 1);
     Real near = LERP(SLOPE(va), SLOPE(vc), i.fz), far = LERP(SLOPE(vb), SLOPE(vd), i.fz);
     gradient->x = 0.5f * LERP(near, far, i.fy);
-    #define LINE(y, z) ACROSS(PAIR(ROW(y, z), 1), i)
-    Real a = ACROSS(PAIR(va, 1), i), b = ACROSS(PAIR(vb, 1), i), c = ACROSS(PAIR(vc, 1), i), d = ACROSS(PAIR(vd, 1), i);
+    Real a = LINE(va), b = LINE(vb), c = LINE(vc), d = LINE(vd);
     Real y0 = LERP(a, c, i.fz), y1 = LERP(b, d, i.fz);
-    Real before = LERP(LINE(-1, 0), LINE(-1, 1), i.fz), after = LERP(LINE(2, 0), LINE(2, 1), i.fz);
+    Real before = LERP(LINE(ROW(-1, 0)), LINE(ROW(-1, 1)), i.fz), after = LERP(LINE(ROW(2, 0)), LINE(ROW(2, 1)), i.fz);
     gradient->y = 0.5f * (LERP(y1, after, i.fy) - LERP(before, y0, i.fy));
     Real z0 = LERP(a, b, i.fy), z1 = LERP(c, d, i.fy);
-    before = LERP(LINE(0, -1), LINE(1, -1), i.fy), after = LERP(LINE(0, 2), LINE(1, 2), i.fy);
+    before = LERP(LINE(ROW(0, -1)), LINE(ROW(1, -1)), i.fy), after = LERP(LINE(ROW(0, 2)), LINE(ROW(1, 2)), i.fy);
     gradient->z = 0.5f * (LERP(z1, after, i.fz) - LERP(before, z0, i.fz));
     #undef ROW
     #undef SLOPE

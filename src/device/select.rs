@@ -65,7 +65,8 @@ const SAMPLER_MODES: &[&str] = &[
     "address repeat (normalised coordinates)",
     "address mirrored_repeat (normalised coordinates)",
 ];
-const FROM_BUFFERS: &str = "buffer: interpolated by the kernels in single precision (bytes: to 2^-7 of a grey level)";
+const FROM_BUFFERS: &str =
+    "buffer: interpolated by the kernels in single precision (bytes: weights of 15 bits along x)";
 const FROM_IMAGES: &str = "image: trilinear by the device's sampler, whose weights have 8 fractional bits on a GPU";
 
 impl DeviceInfo {
