@@ -131,7 +131,7 @@ fn describe(platform: &Platform, device: &ClDevice, forced_lanes: Option<u32>) -
         int64_atomics: cl(device.extensions())?.contains("cl_khr_int64_base_atomics"),
         lanes,
         // A CPU work-item is already a packet, so a group is only the unit that threads share out; a GPU wants whole warps.
-        local_size: if kind == "gpu" { 64 } else { 16 },
+        local_size: if kind == "gpu" { 64 } else { 4 },
     })
 }
 
