@@ -15,7 +15,7 @@ use crate::device::structs::View as DeviceView;
 use crate::error::Result;
 use crate::film::{Film, Samples};
 use crate::scene::{self, Scene};
-use crate::technique::ViewPlan;
+use crate::technique::{CellUse, ViewPlan};
 use crate::volume::Volume;
 
 /// The shortest step that `max_error` leads to, in voxels: the shortest that a request may ask for.
@@ -49,7 +49,8 @@ pub(super) enum Pass {
 pub(super) struct ViewRun {
     plan: ViewPlan,
     volume: Rc<DeviceVolume>,
-    distances: Buffer,
+    /// What the kernel is told of the cells, where that is not their ranges.
+    distances: Option<Buffer>,
     parameters: Buffer,
     view_buffer: Buffer,
     counts: Buffer,
@@ -198,7 +199,7 @@ impl ViewRun {
             &self.view_buffer,
             &self.parameters,
             &self.volume.voxels,
-            &self.distances,
+            self.distances.as_ref().unwrap_or(&self.volume.cells.ranges),
             &layer.table,
             &layer.buffer,
             &self.counts,
@@ -272,9 +273,13 @@ fn distances(
     on_device: &DeviceVolume,
     volume: &Volume,
     plan: &mut ViewPlan,
-) -> Result<Buffer> {
+) -> Result<Option<Buffer>> {
     let [wide, high, deep] = on_device.cells.dims();
-    let Some(values) = &plan.occupied else { return context.device.upload(&vec![0; wide * high * deep], 0) };
+    let values = match &plan.cells {
+        CellUse::Distances(values) => values,
+        CellUse::Ranges => return Ok(None),
+        CellUse::None => return context.device.upload(&vec![0; wide * high * deep], 0).map(Some),
+    };
     // Raw values, rounded outwards.
     let raw = |v: f64| (v - volume.inter()) / volume.slope();
     let intervals: Vec<[f32; 2]> = values
@@ -291,7 +296,7 @@ fn distances(
     context.device.read(&distances, 0, &mut bytes)?;
     let empty = bytes.iter().filter(|d| **d > 0).count();
     plan.reasons.push(format!("{empty} of {} macro-cells are empty under it", bytes.len()));
-    Ok(distances)
+    Ok(Some(distances))
 }
 
 /// Pixels across and down of a work-item: `BEAM_W` × `TILE_W` and `BEAM_H` × `TILE_H` of `kernels/shared/packet.h`.

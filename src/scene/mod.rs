@@ -6,6 +6,7 @@ pub mod interpolation;
 pub mod light;
 pub mod presets;
 pub mod transfer;
+pub mod window;
 
 use std::sync::Arc;
 

@@ -3,7 +3,7 @@
 use super::transfer::ControlPoint;
 
 /// sRGB's decoding (IEC 61966-2-1), for colours that are chosen by eye.
-fn linear(srgb: f64) -> f64 {
+pub fn linear(srgb: f64) -> f64 {
     if srgb <= 0.04045 { srgb / 12.92 } else { ((srgb + 0.055) / 1.055).powf(2.4) }
 }
 

@@ -2,6 +2,8 @@
 
 pub mod emission_absorption;
 pub mod photon_transport;
+pub mod projection;
+pub mod slice;
 
 use std::sync::Arc;
 
@@ -14,7 +16,7 @@ use crate::scene::camera::{Camera, Framing};
 use crate::volume::Volume;
 
 /// Every technique. Adding one is one line.
-pub const ALL: &[Technique] = &[emission_absorption::TECHNIQUE, photon_transport::TECHNIQUE];
+pub const ALL: &[Technique] = &[emission_absorption::TECHNIQUE, photon_transport::TECHNIQUE, projection::TECHNIQUE, slice::TECHNIQUE];
 
 /// The kernel headers that every view is built with, in order.
 pub(crate) const VIEW_HEADERS: &[&str] = &[
@@ -28,6 +30,19 @@ pub(crate) const VIEW_HEADERS: &[&str] = &[
     "shared/curvature.h",
     "shared/style.h",
     "shared/film.h",
+];
+
+/// The kernel headers of views that show a value by window and colour map.
+pub(crate) const VALUE_HEADERS: &[&str] = &[
+    "shared/lanes.h",
+    "shared/rng.h",
+    "shared/camera.h",
+    "shared/voxel.h",
+    "shared/volume.h",
+    "shared/packet.h",
+    "shared/film.h",
+    "shared/window.h",
+    "shared/walk.h",
 ];
 
 /// What the service knows of a technique.
@@ -65,13 +80,24 @@ impl Technique {
     }
 }
 
+/// What a view's kernel is told of the macro-cells (`kernels/cells.cl`).
+#[derive(Debug, Clone, PartialEq)]
+pub enum CellUse {
+    /// How far each cell is from the nearest with a value in these intervals, a byte a cell: those without any are leapt over.
+    Distances(Vec<[f64; 2]>),
+    /// The least and greatest voxel that a sample in each cell can read, in the volume's own type.
+    Ranges,
+    /// Distances of 0: every sample is taken.
+    None,
+}
+
 /// What a view's kernel is run with for one volume: data, no device needed to make it.
 #[derive(Debug, Clone)]
 pub struct ViewPlan {
     /// The kernel variant.
     pub variant: Variant,
-    /// The intervals of values that are worth a sample: macro-cells without any are leapt over. `None` takes every sample.
-    pub occupied: Option<Vec<[f64; 2]>>,
+    /// What the kernel is told of the macro-cells.
+    pub cells: CellUse,
     /// The step of the finest pass, world units.
     pub step: f32,
     /// Past this opacity a ray ends; what it leaves out is part of the error.

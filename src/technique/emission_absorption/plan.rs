@@ -8,7 +8,7 @@ use crate::scene::camera::Camera;
 use crate::scene::interpolation::Interpolation;
 use crate::scene::presets;
 use crate::scene::transfer::{TABLE_SIZE, TransferFunction};
-use crate::technique::{VIEW_HEADERS, View, ViewPlan};
+use crate::technique::{CellUse, VIEW_HEADERS, View, ViewPlan};
 use crate::volume::{Volume, VoxelType};
 
 type Features = [(&'static str, i32); 5];
@@ -123,7 +123,7 @@ impl View for Parameters {
         let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
         Ok(ViewPlan {
             variant: variant(volume.voxels().voxel_type(), self.features()),
-            occupied: skip.then_some(opaque),
+            cells: if skip { CellUse::Distances(opaque) } else { CellUse::None },
             step: (self.step_voxels * smallest) as f32,
             opacity_threshold: self.threshold(),
             reasons,

@@ -1,0 +1,134 @@
+// Projections along a ray: greatest and least value, mean, sum (the line integral in world units) and X-ray (Beer and Lambert).
+// WALKED is the exact walk of shared/walk.h; without it greatest and least are taken on the steps of shared/packet.h, the
+// part of a beam with the greatest bound first, until no part is left that could show more. One work-item is one beam.
+
+#define MODE_PEAK 0
+#define MODE_MEAN 1
+#define MODE_SUM 2
+#define MODE_XRAY 3
+
+static inline void show(constant const View *view, constant const Projection *params, global const uchar *table, global float *film,
+                        global uint *counts, const Packet *p, Real value, Mask shown) {
+    film_value(view, film, counts, p, table, params->window_scale, params->window_offset, params->raw_values, value, shown);
+}
+
+#if WALKED
+static inline void project(constant const View *view, constant const Projection *params, global const uchar *voxels, global const uchar *table,
+                           global float *film, global uint *counts, const Packet *p) {
+    int peaks = params->mode == MODE_PEAK;
+    Walk w = walk(view, voxels, params->sign, peaks, p->ray.origin, p->ray.direction, p->ray.t_near, p->ray.t_far);
+    Real value, integral = mad(w.integral, (Real)(params->slope), w.length * params->inter);
+    Mask shown = MASK(w.length > 0.0f);
+    if (peaks) {
+        shown = MASK(w.best > -INFINITY);
+        value = mad(params->sign * w.best, (Real)(params->slope), (Real)(params->inter));
+    } else if (params->mode == MODE_MEAN) {
+        value = integral / select((Real)(1.0f), w.length, shown);
+    } else if (params->mode == MODE_SUM) {
+        value = integral;
+    } else {
+        // sigma = sigma_per_value (value - zero_value), so its integral needs no walk of its own.
+        value = exp(-params->sigma_per_value * (integral - params->zero_value * w.length));
+        shown = (Mask)(-1); // past the volume all the light gets through
+    }
+    show(view, params, table, film, counts, p, value, shown);
+}
+#else
+// Parts of a beam whose bounds are kept at a time.
+#define PARTS 128
+
+// No sample of the beam in the steps first..last has a greater sign * raw value.
+static inline float part_bound(constant const View *view, constant const Projection *params, global const uchar *cells, const Beam *b, int first,
+                               int last) {
+#if INTERPOLATION == CATMULL_ROM
+    return INFINITY; // overshoots what the cells say
+#else
+    // A B-spline reads a voxel further than the cells do.
+    const float wider = TAPS == 4 ? 1.0f : 0.0f;
+    int from[3], to[3], count[3];
+    for (int i = 0; i < 3; i++) {
+        float p = b->origin[i] + b->direction[i] * ((float)first * view->step);
+        float q = b->origin[i] + b->direction[i] * ((float)last * view->step);
+        count[i] = (view->dims[i] + CELL - 1) / CELL;
+        from[i] = clamp((int)((fmin(p, q) - b->reach[i] - wider) * (1.0f / CELL)), 0, count[i] - 1);
+        to[i] = clamp((int)((fmax(p, q) + b->reach[i] + wider) * (1.0f / CELL)), 0, count[i] - 1);
+    }
+    global const Voxel *ranges = (global const Voxel *)cells + (params->sign > 0.0f ? 1 : 0);
+    Voxel least = ranges[2 * ((from[2] * count[1] + from[1]) * count[0] + from[0])], greatest = least;
+    for (int z = from[2]; z <= to[2]; z++)
+        for (int y = from[1]; y <= to[1]; y++)
+            for (int x = from[0]; x <= to[0]; x++) {
+                Voxel v = ranges[2 * ((z * count[1] + y) * count[0] + x)];
+                least = v < least ? v : least;
+                greatest = v > greatest ? v : greatest;
+            }
+    return params->sign > 0.0f ? (float)greatest : -(float)least;
+#endif
+}
+
+// The steps first..last-1 of one packet, in the lanes that take a sample there.
+static inline void take_steps(constant const View *view, constant const Projection *params, global const uchar *voxels, const Packet *p, int first,
+                              int last, Real *best) {
+    for (int k = first; k < last; k++) {
+        Real v;
+        Mask inside;
+        if (k >= p->inner && k < p->inner_end) {
+            v = params->sign * inner_raw(view, voxels, along(p->start, p->ray.direction, (Real)((float)k * view->step)));
+            inside = MASK(v > *best);
+        } else {
+            Real t, length;
+            inside = edge_sample(view, p, k, &t, &length);
+            if (!any_lane(inside)) continue;
+            v = params->sign * sample_raw(view, voxels, along(p->ray.origin, p->ray.direction, t));
+            inside &= MASK(v > *best);
+        }
+        *best = select(*best, v, inside);
+    }
+}
+#endif
+
+kernel void projection(constant View *view, constant Projection *params, global const uchar *voxels, global const uchar *cells,
+                       global const uchar *table, global float *film, global uint *counts) {
+    int number = view->first_beam + (int)get_global_id(0);
+    if (number >= beams(view)) return;
+    Packet packets[PACKETS];
+    Beam beam = beam_at(view, number, INNER_MARGIN, packets);
+#if WALKED
+    for (int i = 0; i < PACKETS; i++) project(view, params, voxels, table, film, counts, &packets[i]);
+#else
+    Real best[PACKETS];
+    float least[PACKETS]; // what a part has to exceed to be of use to a packet
+    for (int i = 0; i < PACKETS; i++) {
+        best[i] = (Real)(-INFINITY);
+        least[i] = any_lane(MASK(packets[i].ray.t_far > packets[i].ray.t_near)) ? -INFINITY : INFINITY;
+    }
+    for (int begin = beam.begin; begin < beam.end; begin += PARTS * STRIDE) {
+        float bound[PARTS];
+        int parts = min((beam.end - begin + STRIDE - 1) / STRIDE, PARTS);
+        for (int i = 0; i < parts; i++) {
+            int first = begin + i * STRIDE;
+            bound[i] = params->skipping ? part_bound(view, params, cells, &beam, first, min(first + STRIDE, beam.end) - 1) : INFINITY;
+        }
+        for (int done = 0; done < parts; done++) {
+            int next = 0;
+            for (int i = 1; i < parts; i++) next = bound[i] > bound[next] ? i : next;
+            float wanted = least[0];
+            for (int i = 1; i < PACKETS; i++) wanted = fmin(wanted, least[i]);
+            if (!(bound[next] > wanted)) break;
+            int first = begin + next * STRIDE, last = min(first + STRIDE, beam.end);
+            for (int i = 0; i < PACKETS; i++) {
+                if (!(bound[next] > least[i])) continue;
+                take_steps(view, params, voxels, &packets[i], first, last, &best[i]);
+                Mask misses = MASK(!(packets[i].ray.t_far > packets[i].ray.t_near));
+                least[i] = least_lane(select(best[i], (Real)(INFINITY), misses));
+            }
+            bound[next] = -INFINITY;
+        }
+    }
+    for (int i = 0; i < PACKETS; i++) {
+        Mask shown = MASK(best[i] > -INFINITY);
+        Real value = mad(params->sign * best[i], (Real)(params->slope), (Real)(params->inter));
+        show(view, params, table, film, counts, &packets[i], value, shown);
+    }
+#endif
+}

@@ -1,0 +1,287 @@
+//! # `slice`
+//!
+//! The volume cut by a plane (multi-planar reformatting), or the greatest, least or mean value of a slab around it, taken along
+//! the plane's normal. The camera sees the plane where it is in the volume; beside it the picture is transparent. An
+//! orthographic camera that looks along the normal shows it undistorted.
+//!
+//! The mean over the slab is exact for the interpolant, as are its greatest and least value for `nearest` and `trilinear`
+//! (see `kernels/shared/walk.h`); for the splines they are those of five points between two planes of voxels. What of the slab is
+//! outside of the volume does not count. NaN voxels are empty. Nothing depends on a step.
+//!
+//! | parameter | unit | range | default |
+//! |---|---|---|---|
+//! | `plane` | | `point` and `normal`; or `axis` with `position` or `fraction` | through the centre, facing the camera |
+//! | `plane.point`, `plane.normal` | world units | | |
+//! | `plane.axis` | world axis | `x`, `y`, `z` | |
+//! | `plane.position` | world units | | 0 |
+//! | `plane.fraction` | of the volume's extent along the axis | 0–1 | |
+//! | `thickness` | world units | 0–10⁹ | 0: the plane itself |
+//! | `mode` | | `maximum`, `minimum`, `mean`: of the slab | `mean` |
+//! | `interpolation` | | `nearest`, `trilinear`, `b_spline`, `catmull_rom` | `trilinear` |
+//! | `window` | values | `level` and `width`, or `low` and `high` | the volume's range |
+//! | `color_map`, `invert` | | see the schema | `grey`, false |
+//! | `output` | | `color`, or `value`: the value itself in the EXR | `color` |
+//!
+//! Example: see [`example`], which a test runs.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use super::{CellUse, Kind, Technique, View, ViewPlan};
+use crate::device::program::{Source, Variant};
+use crate::device::structs::{DeviceStruct, View as DeviceView};
+use crate::device_struct;
+use crate::error::{Error, Result};
+use crate::request;
+use crate::scene::camera::Camera;
+use crate::scene::interpolation::Interpolation;
+use crate::scene::window::{ColorMap, Output, Window, WindowRequest};
+use crate::volume::{Volume, VoxelType};
+
+/// The technique's line in the list.
+pub const TECHNIQUE: Technique = Technique {
+    name: "slice",
+    summary: "An oblique plane through the volume, or the greatest, least or mean value of a slab around it",
+    schema: request::schema_of::<Parameters>,
+    example,
+    source,
+    kind: Kind::View(parse),
+};
+
+device_struct! {
+    /// The kernel's own parameters.
+    pub struct Slice {
+        /// a x + b y + c z + d is the world distance from the plane of a point in index units.
+        pub plane_index: [f32; 4],
+        /// The unit normal, index units per world unit.
+        pub normal_index: [f32; 3],
+        /// Half the slab, world units.
+        pub half_thickness: f32,
+        /// Whether the slab shows its greatest or least value, not its mean.
+        pub peaks: i32,
+        /// 1 to look for the greatest raw value, −1 for the least.
+        pub sign: f32,
+        /// value = raw × slope + inter.
+        pub slope: f32,
+        /// See `slope`.
+        pub inter: f32,
+        /// Entry of the colour table = value × scale + offset.
+        pub window_scale: f32,
+        /// See `window_scale`.
+        pub window_offset: f32,
+        /// Whether values go to the film instead of colours.
+        pub raw_values: i32,
+    }
+}
+
+/// A plane: a point and a normal, or a place on one of the world's axes.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Plane {
+    /// A point of the plane, world units. Default: the volume's centre.
+    #[schemars(inner(range(min = -1e9, max = 1e9)))]
+    point: Option<[f64; 3]>,
+    /// Across the plane, of any length but 0. Default: towards the camera.
+    #[schemars(inner(range(min = -1e9, max = 1e9)))]
+    normal: Option<[f64; 3]>,
+    /// The world axis that the plane is across, instead of `point` and `normal`.
+    #[schemars(extend("enum" = ["x", "y", "z"]))]
+    axis: Option<String>,
+    /// Where on the axis, world units; 0 is the volume's centre.
+    #[schemars(range(min = -1e9, max = 1e9))]
+    position: Option<f64>,
+    /// Where on the axis, from the one end of the volume's extent to the other.
+    #[schemars(range(min = 0, max = 1))]
+    fraction: Option<f64>,
+}
+
+/// What is shown of a slab.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Mode {
+    /// Its greatest value.
+    Maximum,
+    /// Its least value.
+    Minimum,
+    /// Its mean.
+    #[default]
+    Mean,
+}
+
+/// The parameters in a request.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// Where the volume is cut.
+    #[serde(default)]
+    plane: Plane,
+    /// Thickness of the slab around the plane, world units.
+    #[serde(default)]
+    #[schemars(range(min = 0, max = 1e9))]
+    thickness: f64,
+    /// What is shown of the slab.
+    #[serde(default)]
+    mode: Mode,
+    /// How values lie between voxels. Default: `trilinear`.
+    interpolation: Option<Interpolation>,
+    /// The values from the first to the last colour. Default: the volume's range.
+    window: Option<WindowRequest>,
+    /// The colours.
+    #[serde(default)]
+    color_map: ColorMap,
+    /// Turn the colours round.
+    #[serde(default)]
+    invert: bool,
+    /// `value` writes the value itself to the film.
+    #[serde(default)]
+    output: Output,
+}
+
+/// A request that works as it is.
+pub fn example() -> Value {
+    json!({
+        "technique": "slice",
+        "volume": {"builtin": "shepp_logan", "resolution": 64},
+        "camera": {"eye": [0, 0, 3], "up": [0, 1, 0], "projection": "orthographic"},
+        "image": {"width": 128, "height": 128},
+        "budget": {"samples": 4},
+        "slice": {"plane": {"axis": "z", "fraction": 0.45}, "window": {"level": 0.25, "width": 0.5}}
+    })
+}
+
+type Features = [(&'static str, i32); 1];
+
+/// Every interpolation may be built; the first before the service is ready.
+static FEATURES: [Features; 4] = {
+    use Interpolation::{BSpline, CatmullRom, Nearest, Trilinear};
+    [
+        [("INTERPOLATION", Trilinear.code())],
+        [("INTERPOLATION", Nearest.code())],
+        [("INTERPOLATION", BSpline.code())],
+        [("INTERPOLATION", CatmullRom.code())],
+    ]
+};
+
+const TYPES: [VoxelType; 4] = [VoxelType::U8, VoxelType::I16, VoxelType::U16, VoxelType::F32];
+
+fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
+    Variant { kernel: TECHNIQUE.name, voxel: Some(voxel), features }
+}
+
+fn source() -> Source {
+    Source {
+        kernel: TECHNIQUE.name,
+        headers: super::VALUE_HEADERS,
+        structs: || DeviceView::opencl_text() + &Slice::opencl_text(),
+        arguments: 7,
+        variants: || FEATURES.iter().flat_map(|f| TYPES.map(|t| variant(t, f))).collect(),
+        common: TYPES.len(),
+    }
+}
+
+fn parse(parameters: &Value, at: &str) -> Result<Arc<dyn View>> {
+    let parameters: Parameters = request::parse(parameters, &(TECHNIQUE.schema)(), at)?;
+    if let Some(window) = &parameters.window {
+        window.check(&format!("{at}/window"))?;
+    }
+    parameters.plane.check(&format!("{at}/plane"))?;
+    Ok(Arc::new(parameters))
+}
+
+impl Plane {
+    fn check(&self, at: &str) -> Result<()> {
+        let wrong = |field: &str, detail: &str, permitted: &str| Err(Error::invalid(format!("{at}/{field}"), detail, permitted));
+        let either = "either axis with position or fraction, or point and normal";
+        if self.normal.is_some_and(|n| DVec3::from(n).length() < 1e-9) {
+            return wrong("normal", "the normal is zero", "a direction, at least 1e-9 long");
+        }
+        if self.axis.is_some() {
+            for (given, field) in [(self.point.is_some(), "point"), (self.normal.is_some(), "normal")] {
+                if given {
+                    return wrong(field, "given beside axis", either);
+                }
+            }
+            if self.position.is_some() && self.fraction.is_some() {
+                return wrong("fraction", "given beside position", "one of position and fraction");
+            }
+            return Ok(());
+        }
+        for (given, field) in [(self.position.is_some(), "position"), (self.fraction.is_some(), "fraction")] {
+            if given {
+                return wrong(field, "given without axis", either);
+            }
+        }
+        Ok(())
+    }
+
+    /// A point of the plane and its unit normal, in the world.
+    fn resolve(&self, volume: &Volume, camera: &Camera) -> (DVec3, DVec3) {
+        let axis = match self.axis.as_deref() {
+            Some("x") => DVec3::X,
+            Some("y") => DVec3::Y,
+            Some(_) => DVec3::Z,
+            None => {
+                let normal = self.normal.map(DVec3::from).and_then(DVec3::try_normalize);
+                return (self.point.map_or(DVec3::ZERO, DVec3::from), normal.unwrap_or(camera.towards_eye()));
+            }
+        };
+        let extent = volume.world_half_size().dot(axis);
+        let place = self.fraction.map_or(self.position.unwrap_or(0.0), |f| (2.0 * f - 1.0) * extent);
+        (axis * place, axis)
+    }
+}
+
+impl Parameters {
+    fn window(&self, volume: &Volume) -> Result<Window> {
+        self.window.as_ref().map_or_else(|| Ok(Window::range(volume)), |w| w.check("/slice/window"))
+    }
+}
+
+impl View for Parameters {
+    fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
+        let wanted = [("INTERPOLATION", self.interpolation.unwrap_or(Interpolation::Trilinear).code())];
+        let features = FEATURES.iter().find(|f| **f == wanted).unwrap_or(&FEATURES[0]);
+        let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
+        Ok(ViewPlan {
+            variant: variant(volume.voxel_type(), features),
+            cells: CellUse::None,
+            step: smallest as f32,
+            opacity_threshold: 1.0,
+            reasons: vec![format!("window: {}", self.window(volume)?)],
+        })
+    }
+
+    fn parameters(&self, volume: &Volume, camera: &Camera) -> Result<Vec<u8>> {
+        let (point, normal) = self.plane.resolve(volume, camera);
+        let world_from_index = volume.world_from_index();
+        let [a, b, c] = (world_from_index.matrix3.transpose() * normal).to_array();
+        let d = normal.dot(world_from_index.translation - point);
+        let [window_scale, window_offset] = self.window(volume)?.scale_and_offset();
+        let wanted = if self.mode == Mode::Minimum { -1.0 } else { 1.0 };
+        let device = Slice {
+            plane_index: [a, b, c, d].map(|v| v as f32),
+            normal_index: volume.index_from_world().transform_vector3(normal).as_vec3().to_array(),
+            half_thickness: (0.5 * self.thickness) as f32,
+            peaks: i32::from(self.mode != Mode::Mean),
+            sign: (wanted * volume.slope().signum()) as f32,
+            slope: volume.slope() as f32,
+            inter: volume.inter() as f32,
+            window_scale,
+            window_offset,
+            raw_values: i32::from(self.output == Output::Value),
+        };
+        Ok(bytemuck::bytes_of(&device).to_vec())
+    }
+
+    fn table(&self, _volume: &Volume, _step: f32) -> Result<Vec<u32>> {
+        Ok(self.color_map.table(self.invert))
+    }
+
+    fn look(&self, _camera: &Camera, view: &mut DeviceView) {
+        view.jittered = 0;
+    }
+}

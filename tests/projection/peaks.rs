@@ -1,0 +1,95 @@
+//! Greatest and least value: exact against a fine scan, and on steps with second order.
+
+use serde_json::json;
+
+use super::common::engine::House;
+use super::grid::{Grid, eyes, numbers, rays};
+use super::rays::Eye;
+
+fn check(grid: &Grid, interpolation: &str) {
+    let house = House::shared();
+    let negative = Grid { dims: grid.dims, voxels: grid.voxels.iter().map(|v| -v).collect() };
+    let (volume, turned) = (grid.store(house), negative.store(house));
+    for eye in eyes() {
+        let of = |volume, mode: &str| numbers(house, volume, &eye, &json!({"mode": mode, "interpolation": interpolation, "exact": true}));
+        let (greatest, least) = (of(&volume, "maximum"), of(&turned, "minimum"));
+        for (pixel, d, _) in rays(&eye) {
+            let truth = grid.greatest(eye.eye, d, interpolation);
+            let said = format!("{:?} {interpolation}, eye {:?}, pixel {pixel}", grid.dims, eye.eye);
+            assert_eq!(greatest[pixel].1, truth.is_some(), "{said}");
+            // The scan of 200 points a stretch may miss the top by a little; never may the device be above it by more than that.
+            let truth = truth.unwrap_or(0.0);
+            assert!((greatest[pixel].0 - truth).abs() < 1e-4, "{said}: {} for {truth}", greatest[pixel].0);
+            assert!((least[pixel].0 + truth).abs() < 1e-4, "{said}: {} for {}", least[pixel].0, -truth);
+        }
+    }
+}
+
+#[test]
+fn exact_ones_are_the_interpolants() {
+    check(&Grid::random([7, 5, 9]), "trilinear");
+    for dims in [[1, 1, 1], [1, 4, 5], [5, 3, 1], [2, 2, 2]] {
+        check(&Grid::random(dims), "trilinear");
+    }
+}
+
+#[test]
+fn nearest_ones_are_the_voxels() {
+    // A corner that a ray grazes for a millionth of its length may be seen or not: smooth voxels make that harmless.
+    let smooth = |i: usize| ((i % 7) as f32 * 0.9).sin() * 1e-3 + 0.5 * ((i / 7 % 5) as f32 * 0.01) + 1e-4 * (i / 35) as f32;
+    check(&Grid { dims: [7, 5, 9], voxels: (0..315).map(smooth).collect() }, "nearest");
+    check(&Grid::random([1, 1, 1]), "nearest");
+}
+
+#[test]
+fn holes_are_passed_over() {
+    let mut grid = Grid::random([8, 8, 8]);
+    for i in [0, 77, 219, 220, 300, 511] {
+        grid.voxels[i] = f32::NAN;
+    }
+    check(&grid, "trilinear");
+}
+
+#[test]
+fn on_steps_it_converges_with_second_order_from_below() {
+    // A blob many voxels wide, so that the interpolant looks smooth to the step.
+    let house = House::shared();
+    let blob = |x: f64, y: f64, z: f64| (-3.0 * ((x - 0.1).powi(2) + (y + 0.05).powi(2) + z * z)).exp();
+    let volume = house.floats([96; 3], blob);
+    let eye = Eye::at([2.1, 1.7, 2.3], 36.0);
+    for (mode, interpolation) in [("maximum", "trilinear"), ("maximum", "b_spline")] {
+        let of = |more: serde_json::Value| {
+            let mut parameters = json!({"mode": mode, "interpolation": interpolation});
+            parameters.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+            numbers(house, &volume, &eye, &parameters)
+        };
+        let truth = if interpolation == "trilinear" { of(json!({"exact": true})) } else { of(json!({"step_voxels": 0.1})) };
+        let errors = [16.0, 8.0, 4.0].map(|step| {
+            let got = of(json!({"step_voxels": step}));
+            let errors: Vec<f64> = rays(&eye).filter(|r| r.2 > 1.0).map(|(pixel, ..)| truth[pixel].0 - got[pixel].0).collect();
+            assert!(errors.iter().all(|e| *e > -1e-5), "step {step}: above the greatest value");
+            errors.iter().sum::<f64>() / errors.len() as f64
+        });
+        let order = (errors[0] / errors[2]).log2() / 2.0;
+        println!("{mode} {interpolation}: {errors:?}, order {order}");
+        assert!(order > 1.8, "{errors:?}: order {order}");
+    }
+}
+
+#[test]
+fn the_stated_error_covers_the_real_one() {
+    let house = House::shared();
+    for volume in [house.file(super::common::mri_head()), json!({"builtin": "smoke", "resolution": 64})] {
+        let film = |exact: bool| {
+            house.film(&json!({
+                "technique": "projection", "volume": volume, "image": {"width": 96, "height": 96}, "budget": {"samples": 16},
+                "projection": {"exact": exact, "output": "value"}
+            }))
+        };
+        let ((truth, _), (film, error)) = (film(true), film(false));
+        let real = truth.difference(&film).unwrap();
+        println!("{volume}: real {real}, stated {:?}", error.discretisation);
+        // Both films went through the same places of the pixels, so that the noise of both is one.
+        assert!(error.discretisation.unwrap() > 0.7 * real, "{volume}: says {error:?}, is {real}");
+    }
+}
