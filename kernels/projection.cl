@@ -13,7 +13,7 @@ static inline void show(constant const View *view, constant const Projection *pa
 }
 
 #if WALKED
-static inline void project(constant const View *view, constant const Projection *params, global const uchar *voxels, global const uchar *table,
+static inline void project(constant const View *view, constant const Projection *params, VOLUME voxels, global const uchar *table,
                            global float *film, global uint *counts, const Packet *p) {
     int peaks = params->mode == MODE_PEAK;
     Walk w = walk(view, voxels, params->sign, peaks, p->ray.origin, p->ray.direction, p->ray.t_near, p->ray.t_far);
@@ -67,13 +67,13 @@ static inline float part_bound(constant const View *view, constant const Project
 }
 
 // The steps first..last-1 of one packet, in the lanes that take a sample there.
-static inline void take_steps(constant const View *view, constant const Projection *params, global const uchar *voxels, const Packet *p, int first,
+static inline void take_steps(constant const View *view, constant const Projection *params, VOLUME voxels, const Packet *p, int first,
                               int last, Real *best) {
     for (int k = first; k < last; k++) {
         Real v;
         Mask inside;
         if (k >= p->inner && k < p->inner_end) {
-            v = params->sign * inner_raw(view, voxels, along(p->start, p->ray.direction, (Real)((float)k * view->step)));
+            v = params->sign * whole_step_raw(view, voxels, p, k);
             inside = MASK(v > *best);
         } else {
             Real t, length;
@@ -87,7 +87,7 @@ static inline void take_steps(constant const View *view, constant const Projecti
 }
 #endif
 
-kernel void projection(constant View *view, constant Projection *params, global const uchar *voxels, global const uchar *cells,
+kernel void projection(constant View *view, constant Projection *params, VOLUME voxels, global const uchar *cells,
                        global const uchar *table, global float *film, global uint *counts) {
     int number = view->first_beam + (int)get_global_id(0);
     if (number >= beams(view)) return;

@@ -1,7 +1,7 @@
 // A plane through the volume, or the greatest, least or mean value of a slab around it along its normal, by the exact walk of
 // shared/walk.h. One work-item is one beam.
 
-static inline void cut(constant const View *view, constant const Slice *params, global const uchar *voxels, global const uchar *table,
+static inline void cut(constant const View *view, constant const Slice *params, VOLUME voxels, global const uchar *table,
                        global float *film, global uint *counts, const Packet *p) {
     constant const float *a = params->plane_index, *n = params->normal_index;
     Ray ray = p->ray;
@@ -30,7 +30,7 @@ static inline void cut(constant const View *view, constant const Slice *params, 
     film_value(view, film, counts, p, table, params->window_scale, params->window_offset, params->raw_values, value, shown);
 }
 
-kernel void slice(constant View *view, constant Slice *params, global const uchar *voxels, global const uchar *cells, global const uchar *table,
+kernel void slice(constant View *view, constant Slice *params, VOLUME voxels, global const uchar *cells, global const uchar *table,
                   global float *film, global uint *counts) {
     int number = view->first_beam + (int)get_global_id(0);
     if (number >= beams(view)) return;

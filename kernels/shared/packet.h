@@ -163,6 +163,15 @@ static inline int beam_leap(constant const View *view, const Beam *b, global con
     return (int)steps;
 }
 
+// The raw value at the sample of a step that is whole in every lane: inner <= k < inner_end.
+static inline Real whole_step_raw(constant const View *view, VOLUME voxels, const Packet *p, int k) {
+    Real3 place = along(p->start, p->pace, (Real)((float)k));
+#ifdef NARROW
+    if (k < p->narrow_end) return narrow_raw(view, voxels, place, convert_int4(p->low + p->low_pace * (float)k)) * INNER_UNIT;
+#endif
+    return inner_raw(view, voxels, place) * INNER_UNIT;
+}
+
 // The part of step k that is inside the lane's ray: where its sample lies and for how long it stands, both in t.
 static inline Mask edge_sample(constant const View *view, const Packet *p, int k, Real *t, Real *length) {
     Real from = fmax((Real)((float)k * view->step), p->ray.t_near), to = fmin((Real)((float)(k + 1) * view->step), p->ray.t_far);

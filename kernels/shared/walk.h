@@ -39,6 +39,17 @@ static inline Real crossing_time(const Crossing *c) {
 #if INTERPOLATION == TRILINEAR
 typedef struct { Int x, y, z; Real v[8]; } Corners;
 
+#if VOLUMES_ARE_IMAGES
+// The eight voxels around p.
+static inline Corners corners_at(constant const View *view, VOLUME voxels, Real3 p) {
+    Corners c;
+    c.x = clamp(to_int(floor(p.x - 0.5f)), (Int)(0), (Int)(max(view->dims[0] - 2, 0)));
+    c.y = clamp(to_int(floor(p.y - 0.5f)), (Int)(0), (Int)(max(view->dims[1] - 2, 0)));
+    c.z = clamp(to_int(floor(p.z - 0.5f)), (Int)(0), (Int)(max(view->dims[2] - 2, 0)));
+    for (int i = 0; i < 8; i++) c.v[i] = voxel_raw(view, voxels, c.x + (i & 1), c.y + (i >> 1 & 1), c.z + (i >> 2));
+    return c;
+}
+#else
 // The raw values of two neighbours in x.
 static inline void pair_raw(global const uchar *voxels, Int at, Real *a, Real *b) {
 #if VOXEL == VOXEL_F32
@@ -56,7 +67,7 @@ static inline void pair_raw(global const uchar *voxels, Int at, Real *a, Real *b
 }
 
 // The eight voxels around p. Along an axis of one voxel both are that one.
-static inline Corners corners_at(constant const View *view, global const uchar *voxels, Real3 p) {
+static inline Corners corners_at(constant const View *view, VOLUME voxels, Real3 p) {
     int nx = view->dims[0], ny = view->dims[1], nz = view->dims[2];
     Corners c;
     c.x = clamp(to_int(floor(p.x - 0.5f)), (Int)(0), (Int)(max(nx - 2, 0)));
@@ -70,6 +81,7 @@ static inline Corners corners_at(constant const View *view, global const uchar *
     }
     return c;
 }
+#endif
 
 static inline Real corners_raw(const Corners *c, Real3 p) {
     Real fx = clamp(p.x - 0.5f - to_real(c->x), (Real)(0.0f), (Real)(1.0f));
@@ -108,7 +120,7 @@ static inline void stretch_peak(const Corners *c, float sign, Real3 o, Real3 d, 
 
 // One stretch from t on: the mean of the raw value over it, and the greatest of sign times it where `peaks` (exact for nearest
 // and trilinear; for the cubics the greatest of the five points).
-static inline Real stretch(constant const View *view, global const uchar *voxels, float sign, int peaks, Real3 o, Real3 d, Real t, Real length,
+static inline Real stretch(constant const View *view, VOLUME voxels, float sign, int peaks, Real3 o, Real3 d, Real t, Real length,
                            Mask on, Real *best) {
     Real middle = mad(length, (Real)(0.5f), t);
 #if INTERPOLATION == NEAREST
@@ -136,7 +148,7 @@ static inline Real stretch(constant const View *view, global const uchar *voxels
 #endif
 }
 
-static inline Walk walk(constant const View *view, global const uchar *voxels, float sign, int peaks, Real3 o, Real3 d, Real t_near,
+static inline Walk walk(constant const View *view, VOLUME voxels, float sign, int peaks, Real3 o, Real3 d, Real t_near,
                         Real t_far) {
     Walk w = {(Real)(0.0f), (Real)(0.0f), (Real)(-INFINITY)};
     Crossing x = crossing_from(o.x, d.x, t_near, view->dims[0]), y = crossing_from(o.y, d.y, t_near, view->dims[1]);

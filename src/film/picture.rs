@@ -88,14 +88,18 @@ impl Film {
             table[(v.clamp(0.0, 1.0) * 65535.0 + 0.5) as usize]
         };
         let pixels = self.rgba();
-        let mut out = Vec::with_capacity(pixels.len());
-        for p in pixels.chunks_exact(4) {
+        let channels = if self.background == Background::Transparent { 4 } else { 3 };
+        let mut out = vec![0u8; pixels.len() / 4 * channels];
+        for (p, out) in pixels.chunks_exact(4).zip(out.chunks_exact_mut(channels)) {
             match self.background {
-                Background::Colour(behind) => out.extend_from_slice(&over(p, behind).map(&mut encode)),
+                Background::Colour(behind) => {
+                    let [r, g, b] = over(p, behind);
+                    (out[0], out[1], out[2]) = (encode(r), encode(g), encode(b));
+                }
                 Background::Transparent => {
                     let scale = if p[3] > 0.0 { 1.0 / p[3] } else { 0.0 };
-                    let [r, g, b] = [p[0], p[1], p[2]].map(|c| encode(c * scale));
-                    out.extend_from_slice(&[r, g, b, (p[3].clamp(0.0, 1.0) * 255.0 + 0.5) as u8]);
+                    (out[0], out[1], out[2]) = (encode(p[0] * scale), encode(p[1] * scale), encode(p[2] * scale));
+                    out[3] = (p[3].clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
                 }
             }
         }

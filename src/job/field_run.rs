@@ -44,7 +44,7 @@ impl FieldRun {
         let ledger = device.upload(&vec![0; 8 * plan.ledger], 0)?;
         let ledger_before = vec![0; plan.ledger];
         let (ledgers, done, device_time) = (Vec::new(), 0, Duration::ZERO);
-        let pace = Pace::new(device.info(), 1.0);
+        let pace = Pace::new(device.info(), 1.0, None);
         Ok(Self {
             field: field.clone(),
             plan,

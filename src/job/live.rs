@@ -1,5 +1,6 @@
 //! A job on the device thread: what it does with a turn, and what all jobs there share.
 
+use std::cell::RefCell;
 use std::collections::HashMap;
 use std::rc::Rc;
 use std::sync::atomic::Ordering;
@@ -34,11 +35,34 @@ const IDLE_VOLUME_BYTES: usize = 1 << 30;
 pub(super) struct DeviceVolume {
     pub voxels: Buffer,
     pub cells: Cells,
+    /// Distances to what views wanted to see of it, newest last: a client that turns a volume asks the same again and again.
+    distances: RefCell<Vec<(DistancesKey, Rc<Buffer>)>>,
 }
+
+/// Intervals of raw values and the overshoot, as bits.
+type DistancesKey = (Vec<[u32; 2]>, u32);
+
+/// Distances that are kept for a volume.
+const KEPT_DISTANCES: usize = 4;
 
 impl DeviceVolume {
     fn bytes(&self) -> usize {
         self.voxels.len() + self.cells.ranges.len()
+    }
+
+    /// How far each cell is from a value in `intervals`: [`Cells::distances`].
+    pub fn distances(&self, device: &mut Device, intervals: &[[f32; 2]], overshoot: f32) -> Result<Rc<Buffer>> {
+        let key = (intervals.iter().map(|ends| ends.map(f32::to_bits)).collect(), overshoot.to_bits());
+        let mut kept = self.distances.borrow_mut();
+        if let Some((_, distances)) = kept.iter().find(|(other, _)| *other == key) {
+            return Ok(distances.clone());
+        }
+        let distances = Rc::new(self.cells.distances(device, intervals, overshoot)?);
+        if kept.len() == KEPT_DISTANCES {
+            kept.remove(0);
+        }
+        kept.push((key, distances.clone()));
+        Ok(distances)
     }
 }
 
@@ -46,6 +70,8 @@ impl DeviceVolume {
 pub(super) struct DeviceContext {
     pub device: Device,
     volumes: HashMap<usize, (Weak<Volume>, Rc<DeviceVolume>)>,
+    /// Rays a millisecond of the last pass, by kernel variant.
+    speed: HashMap<Variant, f64>,
 }
 
 impl DeviceContext {
@@ -58,7 +84,7 @@ impl DeviceContext {
             }
         }
         tracing::info!(ms = started.elapsed().as_millis() as u64, lanes = device.info().lanes, "kernels are warm");
-        Ok(Self { device, volumes: HashMap::new() })
+        Ok(Self { device, volumes: HashMap::new(), speed: HashMap::new() })
     }
 
     /// The volume on the device, uploaded and its cells built at first use.
@@ -82,10 +108,20 @@ impl DeviceContext {
         } else {
             voxels
         };
-        let on_device = Rc::new(DeviceVolume { voxels, cells });
+        let on_device = Rc::new(DeviceVolume { voxels, cells, distances: RefCell::default() });
         self.volumes.insert(key, (Arc::downgrade(volume), on_device.clone()));
         self.tidy();
         Ok(on_device)
+    }
+
+    /// Notes how many rays a variant managed.
+    pub fn measured(&mut self, variant: &Variant, rays: usize, took: Duration) {
+        self.speed.insert(*variant, rays as f64 / (took.as_secs_f64() * 1e3).max(1e-3));
+    }
+
+    /// How many rays a millisecond a variant managed of late, if it has run.
+    pub fn speed(&self, variant: &Variant) -> Option<f64> {
+        self.speed.get(variant).copied()
     }
 
     /// Lets go of volumes that are gone from the host, and of idle ones past the limit.
@@ -294,7 +330,8 @@ impl Live {
             }
             Verdict::GoOn => {
                 let due = self.last_frame.is_none_or(|t| t.elapsed() >= FRAME_EVERY);
-                let proper = pass == Pass::Main || self.view.as_ref().is_some_and(|v| v.samples() == 0);
+                let proper =
+                    pass == Pass::Main || self.view.as_ref().is_some_and(|v| v.samples() == 0 && !v.is_quick());
                 if due && proper && !self.job.developing.swap(true, Ordering::AcqRel) {
                     self.snapshot(context, None)?;
                 }

@@ -20,10 +20,11 @@ pub(super) struct Pace {
 }
 
 impl Pace {
-    /// A run whose rays have at most `steps` steps each (1 where there are none).
-    pub fn new(info: &DeviceInfo, steps: f64) -> Self {
+    /// A run whose rays have at most `steps` steps each (1 where there are none); `speed` is what the kernel managed of late, rays a
+    /// millisecond, of which half is taken to start with, since it may have been an easier scene.
+    pub fn new(info: &DeviceInfo, steps: f64, speed: Option<f64>) -> Self {
         let most = WORST_MS * SAMPLES_PER_MS_PER_UNIT * f64::from(info.compute_units) / steps.max(1.0);
-        Self { per_ms: START_PER_MS, slowest: f64::INFINITY, most: most as usize }
+        Self { per_ms: (0.5 * speed.unwrap_or(0.0)).max(START_PER_MS), slowest: f64::INFINITY, most: most as usize }
     }
 
     /// Work-items, of `width` rays or histories each, for about `slice`: whole work-groups, so that the next slice starts where

@@ -20,6 +20,8 @@ use crate::volume::Volume;
 
 /// The shortest step that `max_error` leads to, in voxels: the shortest that a request may ask for.
 const LEAST_STEP_VOXELS: f64 = 0.05;
+/// A picture is not shown before its first pass where that is likely to take less than this.
+const QUICK_MS: f64 = 50.0;
 /// Stride of the control, and of that of a picture whose shorter side is below `SMALL`.
 const CONTROL: usize = 4;
 const CONTROL_SMALL: usize = 2;
@@ -50,7 +52,7 @@ pub(super) struct ViewRun {
     plan: ViewPlan,
     volume: Rc<DeviceVolume>,
     /// What the kernel is told of the cells, where that is not their ranges.
-    distances: Option<Buffer>,
+    distances: Option<Rc<Buffer>>,
     parameters: Buffer,
     view_buffer: Buffer,
     counts: Buffer,
@@ -62,6 +64,9 @@ pub(super) struct ViewRun {
     pass: Option<Pass>,
     cursor: usize,
     pace: Pace,
+    /// Whether the first pass is likely to be over before a picture of the control could be seen.
+    quick: bool,
+    pass_time: Duration,
     /// The longest way through the volume, world units.
     longest: f64,
     least_step: f32,
@@ -102,9 +107,12 @@ impl ViewRun {
         let counts = device.upload(&[0; 32], 0)?;
         let (pass, cursor, device_time) = (None, 0, Duration::ZERO);
         let longest = 2.0 * scene::radius(volume);
+        let speed = context.speed(&plan.variant);
         let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
         Ok(Self {
-            pace: Pace::new(context.device.info(), longest / f64::from(plan.step)),
+            pace: Pace::new(context.device.info(), longest / f64::from(plan.step), speed),
+            quick: quick(speed, size),
+            pass_time: Duration::ZERO,
             longest,
             least_step: (LEAST_STEP_VOXELS * smallest) as f32,
             plan,
@@ -138,7 +146,9 @@ impl ViewRun {
         self.view = Self::view(scene, volume);
         context.device.write(&mut self.parameters, 0, &scene.view().parameters(volume, scene.camera())?)?;
         context.device.write(&mut self.counts, 0, &[0; 32])?;
-        self.pace = Pace::new(context.device.info(), self.longest / f64::from(self.plan.step));
+        let speed = context.speed(&self.plan.variant);
+        self.pace = Pace::new(context.device.info(), self.longest / f64::from(self.plan.step), speed);
+        self.quick = quick(speed, self.size);
         for layer in &mut self.layers {
             layer.samples = 0;
         }
@@ -151,6 +161,11 @@ impl ViewRun {
         self.layers[index(Pass::Main)].samples
     }
 
+    /// Whether a picture of the control is not worth showing.
+    pub fn is_quick(&self) -> bool {
+        self.quick
+    }
+
     /// Whether the step is still longer than what a request may ask for.
     pub fn can_halve_step(&self) -> bool {
         self.plan.step >= 2.0 * self.least_step
@@ -160,7 +175,7 @@ impl ViewRun {
     /// would make a good control, but for their number; a fresh one costs an eighth of a pass.
     pub fn halve_step(&mut self, context: &DeviceContext, scene: &Scene, volume: &Volume) -> Result<()> {
         self.plan.step *= 0.5;
-        self.pace = Pace::new(context.device.info(), self.longest / f64::from(self.plan.step));
+        self.pace = Pace::new(context.device.info(), self.longest / f64::from(self.plan.step), None);
         for (layer, step) in self.layers.iter_mut().zip([2.0 * self.plan.step, self.plan.step]) {
             layer.samples = 0;
             let table = scene.view().table(volume, step)?;
@@ -199,7 +214,7 @@ impl ViewRun {
             &self.view_buffer,
             &self.parameters,
             &self.volume.voxels,
-            self.distances.as_ref().unwrap_or(&self.volume.cells.ranges),
+            self.distances.as_deref().unwrap_or(&self.volume.cells.ranges),
             &layer.table,
             &layer.buffer,
             &self.counts,
@@ -207,9 +222,13 @@ impl ViewRun {
         let took = context.device.run(&self.plan.variant, &arguments, items)?;
         self.pace.learn(items, rays, took);
         self.device_time += took;
+        self.pass_time += took;
         self.cursor += items;
         if self.cursor < beams {
             return Ok(None);
+        }
+        if pass == Pass::Main {
+            context.measured(&self.plan.variant, self.size[0] * self.size[1], self.pass_time);
         }
         self.layers[index(pass)].samples += 1;
         (self.pass, self.cursor) = (None, 0);
@@ -233,6 +252,7 @@ impl ViewRun {
         };
         self.pass_view = view;
         self.pass = Some(pass);
+        self.pass_time = Duration::ZERO;
         pass
     }
 
@@ -267,18 +287,22 @@ impl ViewRun {
     }
 }
 
+fn quick(speed: Option<f64>, [width, height]: [usize; 2]) -> bool {
+    speed.is_some_and(|per_ms| (width * height) as f64 / per_ms < QUICK_MS)
+}
+
 /// How far each cell is from anything that the plan wants to see; a byte is enough where nothing is skipped.
 fn distances(
     context: &mut DeviceContext,
     on_device: &DeviceVolume,
     volume: &Volume,
     plan: &mut ViewPlan,
-) -> Result<Option<Buffer>> {
+) -> Result<Option<Rc<Buffer>>> {
     let [wide, high, deep] = on_device.cells.dims();
     let values = match &plan.cells {
         CellUse::Distances(values) => values,
         CellUse::Ranges => return Ok(None),
-        CellUse::None => return context.device.upload(&vec![0; wide * high * deep], 0).map(Some),
+        CellUse::None => return context.device.upload(&vec![0; wide * high * deep], 0).map(|zero| Some(Rc::new(zero))),
     };
     // Raw values, rounded outwards.
     let raw = |v: f64| (v - volume.inter()) / volume.slope();
@@ -291,7 +315,7 @@ fn distances(
         .collect();
     // Catmull-Rom's weights sum to 1 and their magnitudes to at most 1.25 along an axis: (1.25³ − 1) / 2 of the range.
     let overshoot = if plan.variant.features.contains(&("INTERPOLATION", 3)) { 0.477 } else { 0.0 };
-    let distances = on_device.cells.distances(&mut context.device, &intervals, overshoot)?;
+    let distances = on_device.distances(&mut context.device, &intervals, overshoot)?;
     let mut bytes = vec![0u8; wide * high * deep];
     context.device.read(&distances, 0, &mut bytes)?;
     let empty = bytes.iter().filter(|d| **d > 0).count();

@@ -46,7 +46,11 @@ impl WindowRequest {
         if high > low && (high as f32) > (low as f32) && (high - low).is_finite() {
             Ok(Window { low, high })
         } else {
-            Err(Error::invalid(format!("{at}/{last}"), "the window is empty, or too narrow for 32-bit floats", permitted))
+            Err(Error::invalid(
+                format!("{at}/{last}"),
+                "the window is empty, or too narrow for 32-bit floats",
+                permitted,
+            ))
         }
     }
 }

@@ -197,6 +197,7 @@ fn source() -> Source {
         headers: super::VALUE_HEADERS,
         structs: || DeviceView::opencl_text() + &Projection::opencl_text(),
         arguments: 7,
+        volume: Some(2),
         variants: || FEATURES.iter().flat_map(|f| TYPES.map(|t| variant(t, f))).collect(),
         common: 2 * TYPES.len(),
     }

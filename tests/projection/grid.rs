@@ -102,7 +102,14 @@ impl Grid {
     pub fn greatest(&self, eye: DVec3, d: DVec3, interpolation: &str) -> Option<f64> {
         let t = self.stretches(eye, d, interpolation);
         let scan = |pair: &[f64]| -> Vec<f64> {
-            (0..=200).map(|i| self.value(eye + d * (pair[0] + (pair[1] - pair[0]) * (f64::from(i) + 1e-6) / 200.00001), interpolation)).collect()
+            (0..=200)
+                .map(|i| {
+                    self.value(
+                        eye + d * (pair[0] + (pair[1] - pair[0]) * (f64::from(i) + 1e-6) / 200.00001),
+                        interpolation,
+                    )
+                })
+                .collect()
         };
         t.windows(2).flat_map(scan).filter(|v| !v.is_nan()).reduce(f64::max)
     }

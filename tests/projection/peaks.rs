@@ -11,7 +11,9 @@ fn check(grid: &Grid, interpolation: &str) {
     let negative = Grid { dims: grid.dims, voxels: grid.voxels.iter().map(|v| -v).collect() };
     let (volume, turned) = (grid.store(house), negative.store(house));
     for eye in eyes() {
-        let of = |volume, mode: &str| numbers(house, volume, &eye, &json!({"mode": mode, "interpolation": interpolation, "exact": true}));
+        let of = |volume, mode: &str| {
+            numbers(house, volume, &eye, &json!({"mode": mode, "interpolation": interpolation, "exact": true}))
+        };
         let (greatest, least) = (of(&volume, "maximum"), of(&turned, "minimum"));
         for (pixel, d, _) in rays(&eye) {
             let truth = grid.greatest(eye.eye, d, interpolation);
@@ -36,7 +38,8 @@ fn exact_ones_are_the_interpolants() {
 #[test]
 fn nearest_ones_are_the_voxels() {
     // A corner that a ray grazes for a millionth of its length may be seen or not: smooth voxels make that harmless.
-    let smooth = |i: usize| ((i % 7) as f32 * 0.9).sin() * 1e-3 + 0.5 * ((i / 7 % 5) as f32 * 0.01) + 1e-4 * (i / 35) as f32;
+    let smooth =
+        |i: usize| ((i % 7) as f32 * 0.9).sin() * 1e-3 + 0.5 * ((i / 7 % 5) as f32 * 0.01) + 1e-4 * (i / 35) as f32;
     check(&Grid { dims: [7, 5, 9], voxels: (0..315).map(smooth).collect() }, "nearest");
     check(&Grid::random([1, 1, 1]), "nearest");
 }
@@ -63,10 +66,12 @@ fn on_steps_it_converges_with_second_order_from_below() {
             parameters.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
             numbers(house, &volume, &eye, &parameters)
         };
-        let truth = if interpolation == "trilinear" { of(json!({"exact": true})) } else { of(json!({"step_voxels": 0.1})) };
+        let truth =
+            if interpolation == "trilinear" { of(json!({"exact": true})) } else { of(json!({"step_voxels": 0.1})) };
         let errors = [16.0, 8.0, 4.0].map(|step| {
             let got = of(json!({"step_voxels": step}));
-            let errors: Vec<f64> = rays(&eye).filter(|r| r.2 > 1.0).map(|(pixel, ..)| truth[pixel].0 - got[pixel].0).collect();
+            let errors: Vec<f64> =
+                rays(&eye).filter(|r| r.2 > 1.0).map(|(pixel, ..)| truth[pixel].0 - got[pixel].0).collect();
             assert!(errors.iter().all(|e| *e > -1e-5), "step {step}: above the greatest value");
             errors.iter().sum::<f64>() / errors.len() as f64
         });
