@@ -10,7 +10,8 @@ use std::time::Duration;
 use serde_json::Value;
 use tokio::sync::watch;
 
-use super::live::{DeviceContext, Live, Turn};
+use super::context::DeviceContext;
+use super::live::{Live, Turn};
 use super::{Job, State, develop};
 use crate::config::Limits;
 use crate::device::{Device, DeviceConfig, DeviceInfo};

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::live::DeviceContext;
+use super::context::DeviceContext;
 use super::pace::Pace;
 use crate::device::Buffer;
 use crate::error::Result;

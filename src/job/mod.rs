@@ -4,6 +4,7 @@
 //! the async runtime develops the newest of them into a frame (`develop.rs`); readers watch the latest frame and never hold
 //! anybody up.
 
+mod context;
 mod develop;
 mod engine;
 mod field_run;

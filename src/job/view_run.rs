@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use glam::Vec2;
 
-use super::live::{DeviceContext, DeviceVolume, warm};
+use super::context::{DeviceContext, DeviceVolume, warm};
 use super::pace::Pace;
 use crate::device::Buffer;
 use crate::device::structs::View as DeviceView;
