@@ -16,7 +16,8 @@ use crate::scene::camera::{Camera, Framing};
 use crate::volume::Volume;
 
 /// Every technique. Adding one is one line.
-pub const ALL: &[Technique] = &[emission_absorption::TECHNIQUE, photon_transport::TECHNIQUE, projection::TECHNIQUE, slice::TECHNIQUE];
+pub const ALL: &[Technique] =
+    &[emission_absorption::TECHNIQUE, photon_transport::TECHNIQUE, projection::TECHNIQUE, slice::TECHNIQUE];
 
 /// The kernel headers that every view is built with, in order.
 pub(crate) const VIEW_HEADERS: &[&str] = &[

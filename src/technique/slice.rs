@@ -194,7 +194,9 @@ fn parse(parameters: &Value, at: &str) -> Result<Arc<dyn View>> {
 
 impl Plane {
     fn check(&self, at: &str) -> Result<()> {
-        let wrong = |field: &str, detail: &str, permitted: &str| Err(Error::invalid(format!("{at}/{field}"), detail, permitted));
+        let wrong = |field: &str, detail: &str, permitted: &str| {
+            Err(Error::invalid(format!("{at}/{field}"), detail, permitted))
+        };
         let either = "either axis with position or fraction, or point and normal";
         if self.normal.is_some_and(|n| DVec3::from(n).length() < 1e-9) {
             return wrong("normal", "the normal is zero", "a direction, at least 1e-9 long");

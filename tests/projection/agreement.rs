@@ -51,7 +51,9 @@ fn every_number_of_lanes_gives_the_same_picture() {
     let wide = House::shared();
     for lanes in [1, 4, 8] {
         let narrow = House::new(Some(lanes));
-        for parameters in [json!({}), json!({"mode": "minimum", "exact": true}), json!({"mode": "sum"}), json!({"mode": "xray"})] {
+        for parameters in
+            [json!({}), json!({"mode": "minimum", "exact": true}), json!({"mode": "sum"}), json!({"mode": "xray"})]
+        {
             let film = |house: &House| {
                 let mut parameters = parameters.clone();
                 parameters["output"] = "value".into();

@@ -55,10 +55,12 @@ fn a_smooth_ellipsoids_projection_converges_with_second_order() {
 fn an_xray_of_a_constant_box_is_beer_and_lamberts_law() {
     let house = House::shared();
     let volume = json!({"builtin": "constant", "resolution": 32});
-    for at in [[0.0, 0.0, 3.0], [2.1, 1.7, 2.3], [-3.0, 0.4, 0.2], [0.1, -4.0, 1.0], [5.0, 5.0, -5.0], [0.3, 0.1, 0.2]] {
+    for at in [[0.0, 0.0, 3.0], [2.1, 1.7, 2.3], [-3.0, 0.4, 0.2], [0.1, -4.0, 1.0], [5.0, 5.0, -5.0], [0.3, 0.1, 0.2]]
+    {
         for sigma in [0.05, 0.7, 3.0] {
             let eye = Eye::at(at, 40.0);
-            let got = numbers(house, &volume, &eye, &json!({"mode": "xray", "sigma_per_value": sigma, "zero_value": 0}));
+            let got =
+                numbers(house, &volume, &eye, &json!({"mode": "xray", "sigma_per_value": sigma, "zero_value": 0}));
             for (pixel, d, length) in rays(&eye) {
                 let truth = (-sigma * length).exp();
                 assert!((got[pixel].0 - truth).abs() < 1e-4 * truth, "{at:?}, {sigma}: {} for {truth}", got[pixel].0);
@@ -88,7 +90,11 @@ fn all_modes_of_a_constant_are_the_constant() {
             for eye in eyes() {
                 let got = numbers(house, &volume, &eye, &json!({"mode": mode, "interpolation": interpolation}));
                 for (pixel, ..) in rays(&eye) {
-                    assert!((got[pixel].0 - 0.75).abs() < 1e-5 && got[pixel].1, "{mode} {interpolation}: {:?}", got[pixel]);
+                    assert!(
+                        (got[pixel].0 - 0.75).abs() < 1e-5 && got[pixel].1,
+                        "{mode} {interpolation}: {:?}",
+                        got[pixel]
+                    );
                 }
             }
         }

@@ -11,7 +11,8 @@ fn check(grid: &Grid, interpolation: &str) {
     let sigma = 0.9;
     for eye in eyes() {
         let of = |mode: &str| {
-            let parameters = json!({"mode": mode, "interpolation": interpolation, "sigma_per_value": sigma, "zero_value": 0.1});
+            let parameters =
+                json!({"mode": mode, "interpolation": interpolation, "sigma_per_value": sigma, "zero_value": 0.1});
             numbers(house, &volume, &eye, &parameters)
         };
         let (sum, mean, xray) = (of("sum"), of("mean"), of("xray"));
@@ -23,7 +24,12 @@ fn check(grid: &Grid, interpolation: &str) {
             assert!((xray[pixel].0 - through).abs() < 1e-4, "{said}: X-ray {} for {through}", xray[pixel].0);
             // A stretch so short that it has few digits says nothing of its mean.
             if length > 0.05 {
-                assert!((mean[pixel].0 - truth / length).abs() < 1e-4, "{said}: mean {} for {}", mean[pixel].0, truth / length);
+                assert!(
+                    (mean[pixel].0 - truth / length).abs() < 1e-4,
+                    "{said}: mean {} for {}",
+                    mean[pixel].0,
+                    truth / length
+                );
                 assert!(mean[pixel].1, "{said}");
             }
         }
