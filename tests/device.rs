@@ -16,6 +16,8 @@ use cloudchamber::device::structs::{DeviceStruct, View};
 use cloudchamber::device::{self, Device, DeviceConfig};
 use cloudchamber::technique::emission_absorption::EmissionAbsorption;
 use cloudchamber::technique::photon_transport::{FieldPass, PhotonTransport};
+use cloudchamber::technique::projection::Projection;
+use cloudchamber::technique::slice::Slice;
 use cloudchamber::technique::{self};
 
 fn open(lanes: Option<u32>, kernels: Option<&Path>) -> Device {
@@ -65,6 +67,8 @@ fn structs_lie_the_same_on_host_and_device() {
     same_on_both_sides::<EmissionAbsorption>();
     same_on_both_sides::<FieldPass>();
     same_on_both_sides::<PhotonTransport>();
+    same_on_both_sides::<Projection>();
+    same_on_both_sides::<Slice>();
 }
 
 #[test]
@@ -134,10 +138,17 @@ const VIEW: &str = r#"{"technique": "emission_absorption", "volume": {"builtin":
 const FIELD: &str = r#"{"technique": "emission_absorption", "volume": {"photon_transport": {"photons": 70, "grid": [6, 5, 4]}},
     "image": {"width": 5, "height": 4}, "budget": {"samples": 1}}"#;
 
+const PROJECTION: &str = r#"{"technique": "projection", "volume": {"builtin": "sphere", "resolution": 12},
+    "image": {"width": 9, "height": 7}, "budget": {"samples": 2}, "projection": {}}"#;
+const WALK: &str = r#"{"technique": "projection", "volume": {"builtin": "sphere", "resolution": 8},
+    "image": {"width": 9, "height": 7}, "budget": {"samples": 1}, "projection": {"mode": "xray"}}"#;
+const SLICE: &str = r#"{"technique": "slice", "volume": {"builtin": "sphere", "resolution": 8},
+    "image": {"width": 9, "height": 7}, "budget": {"samples": 2}, "slice": {"thickness": 0.3, "mode": "maximum"}}"#;
+
 #[test]
 fn a_tiny_case_of_each_kernel_is_clean_under_oclgrind() {
     for lanes in ["1", "4"] {
-        for scene in [VIEW, FIELD] {
+        for scene in [VIEW, FIELD, PROJECTION, WALK, SLICE] {
             assert_eq!(oclgrind(scene, lanes, None).trim(), "", "{lanes} lanes: {scene}");
         }
     }

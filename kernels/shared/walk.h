@@ -26,7 +26,7 @@ static inline Crossing crossing_from(Real origin, Real direction, Real t, int n)
     c.inverse = 1.0f / d;
     c.towards = copysign((Real)(1.0f), d);
     c.plane = select(ceil(at) - 1.0f, floor(at) + 1.0f, MASK(d > 0.0f));
-    c.last = (float)(n - 1);
+    c.last = (float)(INTERPOLATION == NEAREST ? n : n - 1);
     return c;
 }
 
@@ -37,16 +37,15 @@ static inline Real crossing_time(const Crossing *c) {
 }
 
 #if INTERPOLATION == TRILINEAR
-typedef struct { Int x, y, z; Real v[8]; } Corners;
+typedef struct { Real3 low; Real v[8]; } Corners;
 
 #if VOLUMES_ARE_IMAGES
-// The eight voxels around p.
+// The eight voxels around p, and the lowest corner; indices are clamped to the grid.
 static inline Corners corners_at(constant const View *view, VOLUME voxels, Real3 p) {
     Corners c;
-    c.x = clamp(to_int(floor(p.x - 0.5f)), (Int)(0), (Int)(max(view->dims[0] - 2, 0)));
-    c.y = clamp(to_int(floor(p.y - 0.5f)), (Int)(0), (Int)(max(view->dims[1] - 2, 0)));
-    c.z = clamp(to_int(floor(p.z - 0.5f)), (Int)(0), (Int)(max(view->dims[2] - 2, 0)));
-    for (int i = 0; i < 8; i++) c.v[i] = voxel_raw(view, voxels, c.x + (i & 1), c.y + (i >> 1 & 1), c.z + (i >> 2));
+    c.low = real3(floor(p.x - 0.5f), floor(p.y - 0.5f), floor(p.z - 0.5f));
+    Int x = to_int(c.low.x), y = to_int(c.low.y), z = to_int(c.low.z);
+    for (int i = 0; i < 8; i++) c.v[i] = voxel_raw(view, voxels, x + (i & 1), y + (i >> 1 & 1), z + (i >> 2));
     return c;
 }
 #else
@@ -66,27 +65,29 @@ static inline void pair_raw(global const uchar *voxels, Int at, Real *a, Real *b
 #endif
 }
 
-// The eight voxels around p. Along an axis of one voxel both are that one.
+// The eight voxels around p, and the lowest corner. Beyond the outermost centres both of a pair are the one at the edge, so
+// that a NaN further in does not reach there.
 static inline Corners corners_at(constant const View *view, VOLUME voxels, Real3 p) {
     int nx = view->dims[0], ny = view->dims[1], nz = view->dims[2];
     Corners c;
-    c.x = clamp(to_int(floor(p.x - 0.5f)), (Int)(0), (Int)(max(nx - 2, 0)));
-    c.y = clamp(to_int(floor(p.y - 0.5f)), (Int)(0), (Int)(max(ny - 2, 0)));
-    c.z = clamp(to_int(floor(p.z - 0.5f)), (Int)(0), (Int)(max(nz - 2, 0)));
-    int row = (ny > 1 ? nx : 0) * VOXEL_BYTES, sheet = (nz > 1 ? nx * ny : 0) * VOXEL_BYTES;
-    Int at = ((c.z * ny + c.y) * nx + c.x) * VOXEL_BYTES;
+    c.low = real3(floor(p.x - 0.5f), floor(p.y - 0.5f), floor(p.z - 0.5f));
+    Int x = to_int(c.low.x), y = to_int(c.low.y), z = to_int(c.low.z);
+    Mask edge = MASK(x < 0) | MASK(x >= nx - 1);
+    x = clamp(x, (Int)(0), (Int)(nx - 1));
+    Int rows[2] = {clamp(y, (Int)(0), (Int)(ny - 1)), clamp(y + 1, (Int)(0), (Int)(ny - 1))};
+    Int sheets[2] = {clamp(z, (Int)(0), (Int)(nz - 1)), clamp(z + 1, (Int)(0), (Int)(nz - 1))};
     for (int i = 0; i < 4; i++) {
-        pair_raw(voxels, at + ((i & 1) * row + (i >> 1) * sheet), &c.v[2 * i], &c.v[2 * i + 1]);
-        if (nx == 1) c.v[2 * i + 1] = c.v[2 * i];
+        pair_raw(voxels, ((sheets[i >> 1] * ny + rows[i & 1]) * nx + x) * VOXEL_BYTES, &c.v[2 * i], &c.v[2 * i + 1]);
+        c.v[2 * i + 1] = select(c.v[2 * i + 1], c.v[2 * i], edge);
     }
     return c;
 }
 #endif
 
 static inline Real corners_raw(const Corners *c, Real3 p) {
-    Real fx = clamp(p.x - 0.5f - to_real(c->x), (Real)(0.0f), (Real)(1.0f));
-    Real fy = clamp(p.y - 0.5f - to_real(c->y), (Real)(0.0f), (Real)(1.0f));
-    Real fz = clamp(p.z - 0.5f - to_real(c->z), (Real)(0.0f), (Real)(1.0f));
+    Real fx = clamp(p.x - 0.5f - c->low.x, (Real)(0.0f), (Real)(1.0f));
+    Real fy = clamp(p.y - 0.5f - c->low.y, (Real)(0.0f), (Real)(1.0f));
+    Real fz = clamp(p.z - 0.5f - c->low.z, (Real)(0.0f), (Real)(1.0f));
     Real a = mad(c->v[1] - c->v[0], fx, c->v[0]), b = mad(c->v[3] - c->v[2], fx, c->v[2]);
     Real d = mad(c->v[5] - c->v[4], fx, c->v[4]), e = mad(c->v[7] - c->v[6], fx, c->v[6]);
     Real front = mad(b - a, fy, a), back = mad(e - d, fy, d);

@@ -24,7 +24,7 @@
 //! | `window` | values of the number | `level` and `width`, or `low` and `high` | what suits the volume |
 //! | `color_map`, `invert` | | see the schema | `grey`, false |
 //! | `output` | | `color`, or `value`: the number itself in the EXR | `color` |
-//! | `sigma_per_value` | 1 / (world unit · value) | 10⁻¹²–10¹² | an optical depth of 1.5 for a ray of mean values |
+//! | `sigma_per_value` | 1 / (world unit · value) | 10⁻¹²–10¹² | an optical depth of 2 for a bright ray |
 //! | `zero_value` | value | | −1000 in Hounsfield units, else the least value or 0 |
 //! | `exact` | | not for splines | true for `nearest` |
 //! | `step_voxels` | smallest voxel side | 0.05–16 | 1 |
@@ -48,13 +48,11 @@ use crate::scene;
 use crate::scene::camera::Camera;
 use crate::scene::interpolation::Interpolation;
 use crate::scene::presets::is_hounsfield;
-use crate::scene::window::{ColorMap, Output, Window, WindowRequest, mean_value};
+use crate::scene::window::{ColorMap, Output, Window, WindowRequest, bright_mean};
 use crate::volume::{Volume, VoxelType};
 
-/// The optical depth that a ray of mean values has in an X-ray by default: a fifth gets through.
-const XRAY_OPTICAL_DEPTH: f64 = 1.5;
-/// The default window of mean and sum reaches this many times as far as the mean voxel.
-const MEAN_REACH: f64 = 2.5;
+/// The optical depth of a bright ray in an X-ray by default: an eighth gets through.
+const XRAY_OPTICAL_DEPTH: f64 = 2.0;
 
 /// The technique's line in the list.
 pub const TECHNIQUE: Technique = Technique {
@@ -239,7 +237,7 @@ impl Parameters {
 
     fn sigma_per_value(&self, volume: &Volume) -> f64 {
         self.sigma_per_value.unwrap_or_else(|| {
-            let mean = (mean_value(volume) - self.zero_value(volume)).abs();
+            let mean = (bright_mean(volume) - self.zero_value(volume)).abs();
             let mean = if mean > 0.0 { mean } else { 1.0 };
             XRAY_OPTICAL_DEPTH / (mean * scene::mean_side(volume))
         })
@@ -249,8 +247,7 @@ impl Parameters {
         if let Some(window) = &self.window {
             return window.check("/projection/window");
         }
-        let [low, high] = volume.range();
-        let far = (low + MEAN_REACH * (mean_value(volume) - low)).min(high);
+        let (low, far) = (volume.range()[0], bright_mean(volume));
         let side = scene::mean_side(volume);
         Ok(match self.mode {
             Mode::Maximum | Mode::Minimum => Window::range(volume),
