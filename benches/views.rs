@@ -51,7 +51,11 @@ fn modes() -> Vec<(&'static str, &'static str, Value)> {
     let mut shaded = composite.clone();
     shaded["shading"] = true.into();
     shaded["light"] = light;
-    vec![("composite", "emission_absorption", composite), ("shaded", "emission_absorption", shaded)]
+    vec![
+        ("composite", "emission_absorption", composite),
+        ("shaded", "emission_absorption", shaded),
+        ("maximum", "projection", json!({})),
+    ]
 }
 
 fn scene(volume: &str, i: usize, technique: &str, parameters: &Value) -> Value {
