@@ -50,11 +50,12 @@ fn modes() -> Vec<(&'static str, &'static str, Value)> {
     let composite = json!({"transfer_function": {"points": points}, "opacity_threshold": 0.992});
     let mut shaded = composite.clone();
     shaded["shading"] = true.into();
-    shaded["light"] = light;
+    shaded["light"] = light.clone();
     vec![
         ("composite", "emission_absorption", composite),
         ("shaded", "emission_absorption", shaded),
         ("maximum", "projection", json!({})),
+        ("isosurface", "isosurface", json!({"isovalue": 76.5, "light": light})),
     ]
 }
 

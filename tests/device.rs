@@ -15,6 +15,7 @@ use cloudchamber::device::program::{Source, Variant};
 use cloudchamber::device::structs::{DeviceStruct, View};
 use cloudchamber::device::{self, Device, DeviceConfig};
 use cloudchamber::technique::emission_absorption::EmissionAbsorption;
+use cloudchamber::technique::isosurface::Isosurface;
 use cloudchamber::technique::photon_transport::{FieldPass, PhotonTransport};
 use cloudchamber::technique::projection::Projection;
 use cloudchamber::technique::slice::Slice;
@@ -66,6 +67,7 @@ fn structs_lie_the_same_on_host_and_device() {
     same_on_both_sides::<CellsPass>();
     same_on_both_sides::<EmissionAbsorption>();
     same_on_both_sides::<FieldPass>();
+    same_on_both_sides::<Isosurface>();
     same_on_both_sides::<PhotonTransport>();
     same_on_both_sides::<Projection>();
     same_on_both_sides::<Slice>();

@@ -76,7 +76,7 @@ static inline Packet packet_at(constant const View *view, int left, int top, flo
     p.inside = MASK(p.column < view->width) & MASK(p.row < view->height);
     Int column = p.column * view->stride, row = p.row * view->stride;
     UInt4Lanes ctr = {as_UInt(row * view->full_width + column), (UInt)(view->sample), (UInt)(0u), (UInt)(view->stream)};
-    p.jitter = view->jittered ? unit_open(philox(ctr, view->seed[0], view->seed[1]).a) : (Real)(0.5f);
+    p.jitter = view->jittered ? unit_open(philox(ctr, view->seed[0], view->seed[1]).a) : (Real)(view->place);
     p.x = to_real(column) + view->offset[0];
     p.y = to_real(row) + view->offset[1];
     p.ray = camera_ray(view, p.x, p.y);

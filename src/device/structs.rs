@@ -113,8 +113,10 @@ device_struct! {
         pub offset: [f32; 2],
         /// The step along the ray, world units.
         pub step: f32,
-        /// Whether samples lie at random places within their steps (1) or in the middle (0).
+        /// Whether samples lie at random places within their steps (1) or all at `place` (0).
         pub jittered: i32,
+        /// Where in their steps samples lie that are not jittered, from 0 to 1.
+        pub place: f32,
         /// How many clipping planes there are.
         pub planes: i32,
         /// Four numbers a plane, index units: a x + b y + c z + d is not negative where the volume is shown.

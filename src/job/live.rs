@@ -307,5 +307,6 @@ fn warnings(volume: &Volume, scene: &Scene) -> Vec<Value> {
         let message = "the clipping planes leave nothing of the volume";
         warnings.push(json!({"code": "clipped_away", "message": message}));
     }
+    warnings.extend(scene.view().warnings(volume));
     warnings
 }

@@ -150,6 +150,7 @@ impl Camera {
             world_gradient_from_index: volume.world_from_index().matrix3.inverse().to_cols_array().map(|v| v as f32),
             flat_squared: flat_squared(volume),
             jittered: 1,
+            place: 0.5,
             ..View::default()
         }
     }

@@ -77,6 +77,11 @@ impl Default for LightRequest {
 }
 
 impl LightRequest {
+    /// A headlight under a bright sky: for a view that shadows the ambient part.
+    pub fn diffuse_sky() -> Self {
+        Self { ambient: 0.6, diffuse: 0.4, specular: 0.15, ..Self::default() }
+    }
+
     /// What a schema cannot say: directions have a length, and there is one way to give them.
     ///
     /// # Errors

@@ -1,6 +1,7 @@
 //! The techniques: the trait of each kind and the one list. A technique is three files of one name and one line here.
 
 pub mod emission_absorption;
+pub mod isosurface;
 pub mod photon_transport;
 pub mod projection;
 pub mod slice;
@@ -16,8 +17,13 @@ use crate::scene::camera::{Camera, Framing};
 use crate::volume::Volume;
 
 /// Every technique. Adding one is one line.
-pub const ALL: &[Technique] =
-    &[emission_absorption::TECHNIQUE, photon_transport::TECHNIQUE, projection::TECHNIQUE, slice::TECHNIQUE];
+pub const ALL: &[Technique] = &[
+    emission_absorption::TECHNIQUE,
+    isosurface::TECHNIQUE,
+    photon_transport::TECHNIQUE,
+    projection::TECHNIQUE,
+    slice::TECHNIQUE,
+];
 
 /// The kernel headers that every view is built with, in order.
 pub(crate) const VIEW_HEADERS: &[&str] = &[
@@ -128,6 +134,10 @@ pub trait View: Send + Sync {
     }
     /// What it asks of the fields that all views share, such as its lights.
     fn look(&self, _camera: &Camera, _view: &mut DeviceView) {}
+    /// What a reader should know of the parameters on this volume: objects with `code` and `message`.
+    fn warnings(&self, _volume: &Volume) -> Vec<Value> {
+        Vec::new()
+    }
 }
 
 /// What a field's kernel is run with: data, no device needed to make it.

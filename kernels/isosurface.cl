@@ -1,0 +1,179 @@
+// Isosurfaces: where the value along a ray passes an isovalue. Rays look at the ends of their steps; where the two are on different
+// sides, the crossing is refined (shared/crossing.h) and lit. One work-item is one beam.
+// LAYERED: several surfaces, or some that are not opaque, are composited front to back. Otherwise a packet's rays go to their
+// first crossing, and all of them are refined and lit at once.
+
+typedef struct {
+    Real ahead;          // the value at the end of the last step
+    int fresh;           // whether that is not known, since a leap came after it
+#if LAYERED
+    Real3 colour;
+    Real transmittance;
+#else
+    Mask on;             // rays that have met nothing yet
+    Bracket found;
+#endif
+} Search;
+
+static inline Search search_start(void) {
+    Real zero = (Real)(0.0f);
+    Search s;
+    s.ahead = zero;
+    s.fresh = 1;
+#if LAYERED
+    s.colour = real3(zero, zero, zero);
+    s.transmittance = (Real)(1.0f);
+#else
+    s.on = (Mask)(-1);
+    s.found = bracket(zero, zero, zero, zero, zero);
+#endif
+    return s;
+}
+
+typedef struct { Real t, length, before, after; Mask inside; } Stretch; // a step: where it starts, and the values at its ends
+
+static inline Stretch stretch_of(constant const View *view, VOLUME voxels, const Packet *p, int k, const Search *s) {
+    Stretch e;
+    e.t = (Real)((float)k * view->step);
+    e.length = (Real)(view->step);
+    if (k >= p->inner && k < p->inner_end) {
+        e.inside = (Mask)(-1);
+        e.before = s->fresh ? whole_step_raw(view, voxels, p, k) : s->ahead;
+        e.after = whole_step_raw(view, voxels, p, k + 1);
+        return e;
+    }
+    Real from = fmax(e.t, p->ray.t_near), to = fmin(e.t + e.length, p->ray.t_far);
+    Mask carried = s->fresh ? (Mask)(0) : MASK(p->ray.t_near < e.t);
+    e.inside = MASK(to > from);
+    e.t = select(e.t, from, e.inside);
+    e.length = select((Real)(0.0f), to - from, e.inside);
+    e.before = sample_raw(view, voxels, along(p->ray.origin, p->ray.direction, e.t));
+    e.before = select(e.before, s->ahead, carried);
+    e.after = sample_raw(view, voxels, along(p->ray.origin, p->ray.direction, e.t + e.length));
+    return e;
+}
+
+// The colour of surface `surface` where the ray is at t, in its light.
+static inline Real3 surface_colour(constant const View *view, constant const Isosurface *params, VOLUME voxels, const Packet *p,
+                                   const Bracket *b, Real t, Mask found, Real3 colour) {
+    if (params->depth) {
+        // The eye is at -t_eye, or as far before the plane as the plane's point is away.
+        Real px = select((Real)(0.0f), p->x, (Int)(view->perspective)), py = select((Real)(0.0f), p->y, (Int)(view->perspective));
+        Real3 w = affine3(view->towards_world, view->right_world, view->down_world, px, py);
+        Real depth = t + (view->perspective ? sqrt(dot3(w, w)) : (Real)(view->t_eye));
+        return real3(depth, depth, depth);
+    }
+    Real3 at = along(p->ray.origin, p->ray.direction, t), ray = ray_world(view, p->x, p->y);
+    Real3 gradient = gradient_world(view, surface_gradient(view, voxels, params->analytic, at, found));
+    Real3 half_way[MAX_LIGHTS];
+    half_ways(view, ray, half_way);
+    Real3 lit = shade(view, gradient, half_way, colour);
+    if (params->occlusion_rays > 0) {
+        Real hidden = view->ambient * occlusion(view, params, voxels, p, b, at, ray, gradient, found);
+        lit = real3(mad(-hidden, colour.x, lit.x), mad(-hidden, colour.y, lit.y), mad(-hidden, colour.z, lit.z));
+    }
+    return lit;
+}
+
+#if LAYERED
+// Both ways through the surfaces: ascending where the value rises, descending where it falls.
+static inline void cross(constant const View *view, constant const Isosurface *params, VOLUME voxels, const Packet *p, const Stretch *e,
+                         Search *s) {
+    Mask rises = MASK(e->after > e->before);
+    for (int i = 0; i < params->surfaces; i++) {
+        int down = params->surfaces - 1 - i;
+        constant const float *one = params->color + 3 * i, *other = params->color + 3 * down;
+        Bracket b = bracket(e->t, e->length, e->before, e->after, select((Real)(params->isovalue[down]), (Real)(params->isovalue[i]), rises));
+        Mask found = crossed(params, &b) & e->inside & MASK(s->transmittance > params->transmittance_floor);
+        if (!any_lane(found)) continue;
+        Real3 colour = select3(real3((Real)(other[0]), (Real)(other[1]), (Real)(other[2])), real3((Real)(one[0]), (Real)(one[1]), (Real)(one[2])), rises);
+        Real t = refined(view, params, voxels, p, b, found);
+        colour = surface_colour(view, params, voxels, p, &b, t, found, colour);
+        Real opacity = select((Real)(params->opacity[down]), (Real)(params->opacity[i]), rises);
+        Real weight = select((Real)(0.0f), s->transmittance * opacity, found);
+        s->colour = real3(mad(colour.x, weight, s->colour.x), mad(colour.y, weight, s->colour.y), mad(colour.z, weight, s->colour.z));
+        s->transmittance -= weight;
+    }
+}
+#else
+static inline void cross(constant const View *view, constant const Isosurface *params, VOLUME voxels, const Packet *p, const Stretch *e,
+                         Search *s) {
+    Bracket b = bracket(e->t, e->length, e->before, e->after, (Real)(params->isovalue[0]));
+    Mask found = crossed(params, &b) & e->inside & s->on;
+    if (!any_lane(found)) return;
+    s->found = select_bracket(s->found, b, found);
+    s->on &= ~found;
+}
+#endif
+
+// The steps from k to end - 1 of a packet.
+static inline void seek(constant const View *view, constant const Isosurface *params, VOLUME voxels, const Packet *p, int k, int end,
+                        Search *search) {
+    Search s = *search;
+    for (; k < end; k++) {
+        Stretch e = stretch_of(view, voxels, p, k, &s);
+        if (any_lane(e.inside)) cross(view, params, voxels, p, &e, &s);
+        s.ahead = e.after;
+        s.fresh = 0;
+    }
+    *search = s;
+}
+
+// Whether any ray of the packet is still on its way at step k.
+static inline int goes_on(constant const View *view, constant const Isosurface *params, const Packet *p, const Search *s, int k) {
+    Mask inside = MASK(p->ray.t_far > fmax(p->ray.t_near, (Real)((float)k * view->step)));
+#if LAYERED
+    return any_lane(inside & MASK(s->transmittance > params->transmittance_floor));
+#else
+    return any_lane(inside & s->on);
+#endif
+}
+
+static inline void show(constant const View *view, constant const Isosurface *params, VOLUME voxels, global float *film,
+                        global uint *counts, const Packet *p, const Search *s) {
+    Real3 colour = real3((Real)(0.0f), (Real)(0.0f), (Real)(0.0f));
+#if LAYERED
+    colour = s->colour;
+    Real alpha = 1.0f - s->transmittance;
+#else
+    Mask found = ~s->on;
+    Real alpha = select((Real)(0.0f), (Real)(1.0f), found);
+    if (any_lane(found)) {
+        constant const float *c = params->color;
+        Real t = refined(view, params, voxels, p, s->found, found);
+        Real3 lit = surface_colour(view, params, voxels, p, &s->found, t, found, real3((Real)(c[0]), (Real)(c[1]), (Real)(c[2])));
+        colour = select3(colour, lit, found);
+    }
+#endif
+    film_packet(view, film, counts, p->column, p->row, colour, alpha);
+}
+
+kernel void isosurface(constant View *view, constant Isosurface *params, VOLUME voxels, global const uchar *distances,
+                       global const uchar *table, global float *film, global uint *counts) {
+    int number = view->first_beam + (int)get_global_id(0);
+    if (number >= beams(view)) return;
+    Packet packets[PACKETS];
+    Search searches[PACKETS];
+    Beam beam = beam_at(view, number, INNER_MARGIN, packets);
+    int going = 0;
+    for (int i = 0; i < PACKETS; i++) {
+        searches[i] = search_start();
+        going |= goes_on(view, params, &packets[i], &searches[i], beam.begin) ? 1 << i : 0;
+    }
+    for (int k = beam.begin; k < beam.end && going;) {
+        int leap = beam_leap(view, &beam, distances, k);
+        if (leap > 0) {
+            k += leap;
+            for (int i = 0; i < PACKETS; i++) searches[i].fresh = 1;
+            continue;
+        }
+        int end = min(k + STRIDE, beam.end);
+        for (int i = 0; i < PACKETS; i++) {
+            if (!(going >> i & 1)) continue;
+            seek(view, params, voxels, &packets[i], k, end, &searches[i]);
+            if (!goes_on(view, params, &packets[i], &searches[i], end)) going &= ~(1 << i);
+        }
+        k = end;
+    }
+    for (int i = 0; i < PACKETS; i++) show(view, params, voxels, film, counts, &packets[i], &searches[i]);
+}
