@@ -156,12 +156,20 @@ static inline void preintegrated_step(constant const View *view, constant const 
 #endif
 
 #if defined(NARROW) && !SHADED
-// inner_step of lanes that are close together.
-static inline void narrow_step(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
-                               global const uchar *table, const Packet *p, float k, Radiance *r) {
-    int4 first = convert_int4(p->low + p->low_pace * k);
-    Real raw = narrow_raw(view, voxels, along(p->start, p->pace, (Real)(k)), first);
-    composite(params, classify(params, table, raw, INNER_UNIT), r);
+// The steps from k to end - 1 of lanes that are close together, as a pipeline: while a step's voxels are on their way, the one
+// before it is interpolated and the one before that composited. Otherwise each would wait for its own loads.
+static inline void narrow_steps(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
+                                global const uchar *table, const Packet *p, int k, int end, Radiance *r) {
+    Block block = block_at(view, voxels, convert_int4(p->low + p->low_pace * (float)k));
+    Optical before = {{(Real)(0.0f), (Real)(0.0f), (Real)(0.0f)}, (Real)(0.0f)};
+    for (float at = (float)k; k < end; k++, at += 1.0f) {
+        Block next = block_at(view, voxels, convert_int4(p->low + p->low_pace * fmin(at + 1.0f, (float)(end - 1))));
+        Optical o = classify(params, table, block_raw(&block, along(p->start, p->pace, (Real)(at))), INNER_UNIT);
+        composite(params, before, r);
+        before = o;
+        block = next;
+    }
+    composite(params, before, r);
 }
 #endif
 
@@ -210,7 +218,8 @@ static inline void march(constant const View *view, constant const EmissionAbsor
 #if defined(NARROW) && !SHADED
         if (k >= p->inner && k < p->narrow_end) {
             int to = min(end, p->narrow_end);
-            for (float at = (float)k; k < to; k++, at += 1.0f) narrow_step(view, params, voxels, table, p, at, &r);
+            narrow_steps(view, params, voxels, table, p, k, to, &r);
+            k = to;
             continue;
         }
 #endif

@@ -239,19 +239,44 @@ static inline Real inner_raw(constant const View *view, VOLUME voxels, Real3 p) 
 // most the lanes' least place, comes with one gather, a row a lane, and is read by permutations.
 #define NARROW 1.98f
 
-static inline Real narrow_raw(constant const View *view, VOLUME voxels, Real3 p, int4 first) {
+// One load wherever it lies; of four bytes the compiler makes two.
+typedef struct __attribute__((packed)) { int word; } Unaligned;
+
+static inline int4 load_rows(global const uchar *from, int row) {
+    #define WORD(n) ((global const Unaligned *)(from + (n) * row))->word
+    return (int4)(WORD(0), WORD(1), WORD(2), WORD(3));
+    #undef WORD
+}
+
+static inline Int load_block(global const uchar *from, int row, int sheet) {
+    return (Int)(load_rows(from, row), load_rows(from + sheet, row), load_rows(from + 2 * sheet, row), load_rows(from + 3 * sheet, row));
+}
+
+// The block of voxels for a step: `first` is its lowest corner, kept inside the volume.
+typedef struct { Int rows; int4 first; } Block;
+
+static inline Block block_at(constant const View *view, VOLUME voxels, int4 first) {
     int row = view->dims[0], sheet = view->dims[0] * view->dims[1];
-    first = min(first, (int4)(row, view->dims[1], view->dims[2], 4) - 4);
-    global const uchar *corner = voxels + ((size_t)first.z * sheet + first.y * row + first.x);
-    Int block = gather_words(corner, (LANE_IDS & 3) * row + (LANE_IDS >> 2) * sheet);
+    Block b;
+    b.first = min(first, (int4)(row, view->dims[1], view->dims[2], 4) - 4);
+    b.rows = load_block(voxels + ((size_t)b.first.z * sheet + b.first.y * row + b.first.x), row, sheet);
+    return b;
+}
+
+static inline Real block_raw(const Block *block, Real3 p) {
     Inner i = inner_at(p);
-    Int at = (i.z << 2) + i.y - (first.z * 4 + first.y);
-    Int order = __builtin_astype(BOTH(i.x), Int) + (PAIR_ORDER - first.x * 0x10001);
-    #define LINE(n) to_real(MULTIPLY_ADD(SHUFFLE(__builtin_ia32_permvarsi512(block, at + (n)), order), i.weights))
+    Int at = (i.z << 2) + i.y - (block->first.z * 4 + block->first.y);
+    Int order = __builtin_astype(BOTH(i.x), Int) + (PAIR_ORDER - block->first.x * 0x10001);
+    #define LINE(n) to_real(MULTIPLY_ADD(SHUFFLE(__builtin_ia32_permvarsi512(block->rows, at + (n)), order), i.weights))
     Real a = LINE(0), b = LINE(1), c = LINE(4), d = LINE(5);
     #undef LINE
     Real near = LERP(a, c, i.fz), far = LERP(b, d, i.fz);
     return LERP(near, far, i.fy);
+}
+
+static inline Real narrow_raw(constant const View *view, VOLUME voxels, Real3 p, int4 first) {
+    Block b = block_at(view, voxels, first);
+    return block_raw(&b, p);
 }
 #endif
 
