@@ -8,17 +8,13 @@ typedef struct { Real3 colour; Real alpha; } Optical;
 typedef struct { Real3 colour; Real transmittance; } Radiance;
 
 // A colour is kept as 1 + channel * 65535/65536 (blue: 4095/4096): then its bits in the table are those of a float's fraction.
-// What is composited of it is too high by 1 - transmittance.
+// What is composited of it is too high by 1 - transmittance. Where samples are coloured one by one it is decoded before.
+#define DECODED_EACH (SHADED || STYLED || PREINTEGRATED)
 #define CHANNEL(bits, mask) as_Real(((bits) & (mask)) | 0x3f800000)
 
 static inline Real3 decoded(Real3 colour, Real weight) {
     Real3 c = real3(fmax(colour.x - weight, (Real)(0.0f)), fmax(colour.y - weight, (Real)(0.0f)), fmax(colour.z - weight, (Real)(0.0f)));
     return real3(c.x * (65536.0f / 65535.0f), c.y * (65536.0f / 65535.0f), c.z * (4096.0f / 4095.0f));
-}
-
-static inline Real3 encoded(Real3 colour) {
-    return real3(mad(colour.x, (Real)(65535.0f / 65536.0f), (Real)(1.0f)), mad(colour.y, (Real)(65535.0f / 65536.0f), (Real)(1.0f)),
-                 mad(colour.z, (Real)(4095.0f / 4096.0f), (Real)(1.0f)));
 }
 
 // An entry of the table is two words: the opacity's float less its ten lowest bits, which hold the upper bits of blue, its two
@@ -51,7 +47,7 @@ static inline Optical classify(constant const EmissionAbsorption *params, global
 #if SHADED
 // The colour of a sample of gradient g, in index units, under the lights.
 static inline Real3 lit(constant const View *view, const Packet *p, Real3 g, Real3 colour) {
-    return encoded(shade(view, gradient_world(view, g), p->half_way, decoded(colour, (Real)(1.0f))));
+    return shade(view, gradient_world(view, g), p->half_way, decoded(colour, (Real)(1.0f)));
 }
 #endif
 
@@ -94,7 +90,7 @@ static inline void styled_step(constant const View *view, constant const Emissio
     Real factor = extinction_factor(params, &s) * (length / view->step);
     o.alpha = select((Real)(0.0f), opacity_times(o.alpha, factor), inside & MASK(factor == factor));
     if (!any_lane(MASK(o.alpha > 0.0f))) return;
-    o.colour = encoded(styled_colour(view, params, &s, decoded(o.colour, (Real)(1.0f))));
+    o.colour = styled_colour(view, params, &s, decoded(o.colour, (Real)(1.0f)));
     composite(params, o, r);
 }
 #endif
@@ -150,22 +146,35 @@ static inline void preintegrated_step(constant const View *view, constant const 
     Real3 at = along(p->ray.origin, p->ray.direction, 0.5f * (from + to));
     o.colour = shade(view, gradient_world(view, gradient_raw(view, voxels, at)), p->half_way, o.colour);
 #endif
-    o.colour = encoded(o.colour);
     composite(params, o, r);
 }
 #endif
 
-#if defined(NARROW) && !SHADED
+#ifdef NARROW
+#if SHADED
+#define BLOCK WideBlock
+#define BLOCK_AT wide_block_at
+#define BLOCK_RAW wide_raw
+#else
+#define BLOCK Block
+#define BLOCK_AT block_at
+#define BLOCK_RAW block_raw
+#endif
 // The steps from k to end - 1 of lanes that are close together, as a pipeline: while a step's voxels are on their way, the one
 // before it is interpolated and the one before that composited. Otherwise each would wait for its own loads.
 static inline void narrow_steps(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
                                 global const uchar *table, const Packet *p, int k, int end, Radiance *r) {
-    Block block = block_at(view, voxels, convert_int4(p->low + p->low_pace * (float)k));
+    BLOCK block = BLOCK_AT(view, voxels, convert_int4(p->low + p->low_pace * (float)k));
     Optical before = {{(Real)(0.0f), (Real)(0.0f), (Real)(0.0f)}, (Real)(0.0f)};
     for (float at = (float)k; k < end; k++, at += 1.0f) {
-        Block next = block_at(view, voxels, convert_int4(p->low + p->low_pace * fmin(at + 1.0f, (float)(end - 1))));
-        Optical o = classify(params, table, block_raw(&block, along(p->start, p->pace, (Real)(at))), INNER_UNIT);
+        BLOCK next = BLOCK_AT(view, voxels, convert_int4(p->low + p->low_pace * fmin(at + 1.0f, (float)(end - 1))));
+        Real3 place = along(p->start, p->pace, (Real)(at));
+        Optical o = classify(params, table, BLOCK_RAW(&block, place), INNER_UNIT);
         composite(params, before, r);
+#if SHADED
+        Mask seen = MASK(o.alpha > 0.0f) & MASK(r->transmittance > params->transmittance_floor);
+        if (any_lane(seen)) o.colour = lit(view, p, scale3(wide_gradient(&block, place), (Real)(INNER_UNIT)), o.colour);
+#endif
         before = o;
         block = next;
     }
@@ -215,7 +224,7 @@ static inline void march(constant const View *view, constant const EmissionAbsor
     for (; k < end; k++) styled_step(view, params, voxels, table, p, k, &r);
 #endif
     while (k < end) {
-#if defined(NARROW) && !SHADED
+#ifdef NARROW
         if (k >= p->inner && k < p->narrow_end) {
             int to = min(end, p->narrow_end);
             narrow_steps(view, params, voxels, table, p, k, to, &r);
@@ -270,7 +279,7 @@ kernel void emission_absorption(constant View *view, constant EmissionAbsorption
 #endif
     for (int i = 0; i < PACKETS; i++) {
         Real alpha = 1.0f - r[i].transmittance;
-        Real3 colour = scale3(decoded(r[i].colour, alpha), (Real)(params->brightness));
+        Real3 colour = scale3(DECODED_EACH ? r[i].colour : decoded(r[i].colour, alpha), (Real)(params->brightness));
         film_packet(view, film, counts, packets[i].column, packets[i].row, colour, alpha);
     }
 }

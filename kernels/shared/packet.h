@@ -47,7 +47,7 @@ static inline int beams(constant const View *view) {
 
 #ifdef NARROW
 // The least of linear functions lies above its chord, the greatest below.
-static inline void narrow_range(Packet *p) {
+static inline void narrow_range(constant const View *view, Packet *p) {
     float from = (float)p->inner, steps = (float)max(p->inner_end - p->inner, 1), room = steps;
     float low[3], pace[3];
     #define AXIS(i, c, scale)                                                                                              \
@@ -66,6 +66,9 @@ static inline void narrow_range(Packet *p) {
     p->low = (float4)(low[0], low[1], low[2], 0.0f);
     p->low_pace = (float4)(pace[0], pace[1], pace[2], 0.0f);
     p->narrow_end = min(p->inner + (int)room, p->inner_end);
+#if SHADED
+    if (min(view->dims[0], min(view->dims[1], view->dims[2])) < WIDE_LEAST) p->narrow_end = p->inner;
+#endif
 }
 #endif
 
@@ -88,7 +91,7 @@ static inline Packet packet_at(constant const View *view, int left, int top, flo
     p.inner = (int)ceil(clamp(from, -1e8f, 1e8f));
     p.inner_end = (int)floor(clamp(to, -1e8f, 1e8f));
 #ifdef NARROW
-    narrow_range(&p);
+    narrow_range(view, &p);
 #endif
     return p;
 }

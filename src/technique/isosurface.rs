@@ -233,6 +233,8 @@ fn source() -> Source {
             "shared/camera.h",
             "shared/voxel.h",
             "shared/volume.h",
+            "shared/inner.h",
+            "shared/block.h",
             "shared/packet.h",
             "shared/shade.h",
             "shared/crossing.h",
