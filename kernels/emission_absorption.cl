@@ -166,18 +166,26 @@ static inline void narrow_steps(constant const View *view, constant const Emissi
                                 global const uchar *table, const Packet *p, int k, int end, Radiance *r) {
     BLOCK block = BLOCK_AT(view, voxels, convert_int4(p->low + p->low_pace * (float)k));
     Optical before = {{(Real)(0.0f), (Real)(0.0f), (Real)(0.0f)}, (Real)(0.0f)};
+#if SHADED
+    Real3 gradient = before.colour;
+#endif
     for (float at = (float)k; k < end; k++, at += 1.0f) {
         BLOCK next = BLOCK_AT(view, voxels, convert_int4(p->low + p->low_pace * fmin(at + 1.0f, (float)(end - 1))));
         Real3 place = along(p->start, p->pace, (Real)(at));
         Optical o = classify(params, table, BLOCK_RAW(&block, place), INNER_UNIT);
-        composite(params, before, r);
 #if SHADED
-        Mask seen = MASK(o.alpha > 0.0f) & MASK(r->transmittance > params->transmittance_floor);
-        if (any_lane(seen)) o.colour = lit(view, p, scale3(wide_gradient(&block, place), (Real)(INNER_UNIT)), o.colour);
+        Real3 steep = gradient;
+        if (any_lane(MASK(o.alpha > 0.0f))) steep = wide_gradient(&block, place);
+        if (any_lane(MASK(before.alpha > 0.0f))) before.colour = lit(view, p, scale3(gradient, (Real)(INNER_UNIT)), before.colour);
+        gradient = steep;
 #endif
+        composite(params, before, r);
         before = o;
         block = next;
     }
+#if SHADED
+    before.colour = lit(view, p, scale3(gradient, (Real)(INNER_UNIT)), before.colour);
+#endif
     composite(params, before, r);
 }
 #endif

@@ -3,6 +3,8 @@
 //! A body is checked against the very schema that is served (`schema`), so what the documentation permits and what the
 //! server permits cannot drift apart; what a schema cannot say is checked when the [`crate::scene`] is made.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use jsonschema::error::{TypeKind, ValidationErrorKind};
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::Deserialize;
@@ -184,10 +186,22 @@ fn with_whole_numbers(value: &Value) -> Value {
 /// # Errors
 /// As [`parse`].
 pub fn check(value: &Value, schema: &Value, at: &str) -> Result<()> {
-    let validator = jsonschema::validator_for(schema).map_err(Error::internal)?;
+    let validator = validator(schema)?;
     let violations: Vec<Violation> =
         validator.iter_errors(value).flat_map(|e| violation(&e, schema, at)).take(20).collect();
     if violations.is_empty() { Ok(()) } else { Err(Error::Invalid(violations)) }
+}
+
+/// The compiled schema. They are few, and compiling one takes longer than checking a request.
+fn validator(schema: &Value) -> Result<Arc<jsonschema::Validator>> {
+    static COMPILED: Mutex<Vec<(Value, Arc<jsonschema::Validator>)>> = Mutex::new(Vec::new());
+    let mut compiled = COMPILED.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, validator)) = compiled.iter().find(|(known, _)| known == schema) {
+        return Ok(validator.clone());
+    }
+    let validator = Arc::new(jsonschema::validator_for(schema).map_err(Error::internal)?);
+    compiled.push((schema.clone(), validator.clone()));
+    Ok(validator)
 }
 
 /// Our words for a schema error. An unknown field is reported at its own pointer, not its parent's.

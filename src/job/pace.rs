@@ -11,6 +11,9 @@ const SAMPLES_PER_MS_PER_UNIT: f64 = 5e4;
 /// A slice takes at most about this, should every ray in it be as long as the longest.
 const WORST_MS: f64 = 100.0;
 
+/// How much more a slice may be of a kernel whose speed is known.
+const KNOWN: f64 = 4.0;
+
 /// The speed of one run.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pace {
@@ -23,8 +26,11 @@ impl Pace {
     /// A run whose rays have at most `steps` steps each (1 where there are none); `speed` is what the kernel managed of late, rays a
     /// millisecond, of which half is taken to start with, since it may have been an easier scene.
     pub fn new(info: &DeviceInfo, steps: f64, speed: Option<f64>) -> Self {
-        let most = WORST_MS * SAMPLES_PER_MS_PER_UNIT * f64::from(info.compute_units) / steps.max(1.0);
-        Self { per_ms: (0.5 * speed.unwrap_or(0.0)).max(START_PER_MS), slowest: f64::INFINITY, most: most as usize }
+        let slow = WORST_MS * SAMPLES_PER_MS_PER_UNIT * f64::from(info.compute_units) / steps.max(1.0);
+        // A kernel that has shown that it is not slow may take more, should its rays be no worse than those of the picture before.
+        let shown = speed.map_or(0.0, |per_ms| WORST_MS * per_ms).min(KNOWN * slow);
+        let per_ms = (0.5 * speed.unwrap_or(0.0)).max(START_PER_MS);
+        Self { per_ms, slowest: f64::INFINITY, most: slow.max(shown) as usize }
     }
 
     /// Work-items, of `width` rays or histories each, for about `slice`: whole work-groups, so that the next slice starts where

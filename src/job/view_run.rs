@@ -23,7 +23,7 @@ const LEAST_STEP_VOXELS: f64 = 0.05;
 /// A picture is not shown before its first pass where that is likely to take less than this.
 const QUICK_MS: f64 = 50.0;
 /// Stride of the control, and of that of a picture whose shorter side is below `SMALL`.
-const CONTROL: usize = 4;
+const CONTROL: usize = 8;
 const CONTROL_SMALL: usize = 2;
 const SMALL: usize = 200;
 

@@ -81,43 +81,6 @@ impl std::fmt::Display for Window {
     }
 }
 
-/// Rays a side and samples a ray by which [`bright_mean`] looks at a volume.
-const LOOK_RAYS: usize = 32;
-const LOOK_SAMPLES: usize = 128;
-
-/// The mean of the finite voxels along a bright ray: what one in fifty of the rays along the grid's axes stays above. A mean over
-/// the whole volume would say little of a few vessels in much air.
-pub fn bright_mean(volume: &Volume) -> f64 {
-    let dims = volume.dims();
-    let mut means = Vec::with_capacity(3 * LOOK_RAYS * LOOK_RAYS);
-    let place = |i: usize, of: usize, n: usize| (2 * i + 1) * n / (2 * of);
-    for axis in 0..3 {
-        let (across, down) = ((axis + 1) % 3, (axis + 2) % 3);
-        let count = |axis: usize, most: usize| dims[axis].min(most);
-        for i in 0..count(across, LOOK_RAYS) {
-            for j in 0..count(down, LOOK_RAYS) {
-                let (mut sum, mut found) = (0.0, 0.0);
-                let samples = count(axis, LOOK_SAMPLES);
-                for k in 0..samples {
-                    let mut at = [0; 3];
-                    at[axis] = place(k, samples, dims[axis]);
-                    at[across] = place(i, count(across, LOOK_RAYS), dims[across]);
-                    at[down] = place(j, count(down, LOOK_RAYS), dims[down]);
-                    let value = volume.value(at[0], at[1], at[2]);
-                    if value.is_finite() {
-                        (sum, found) = (sum + value, found + 1.0);
-                    }
-                }
-                if found > 0.0 {
-                    means.push(sum / found);
-                }
-            }
-        }
-    }
-    means.sort_by(f64::total_cmp);
-    means.get(means.len().saturating_sub(1) * 49 / 50).copied().unwrap_or(0.0)
-}
-
 /// Colours from the low to the high end. Those of perceptual maps are those of d3-scale-chromatic.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]

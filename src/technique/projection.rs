@@ -48,7 +48,7 @@ use crate::scene;
 use crate::scene::camera::Camera;
 use crate::scene::interpolation::Interpolation;
 use crate::scene::presets::is_hounsfield;
-use crate::scene::window::{ColorMap, Output, Window, WindowRequest, bright_mean};
+use crate::scene::window::{ColorMap, Output, Window, WindowRequest};
 use crate::volume::{Volume, VoxelType};
 
 /// The optical depth of a bright ray in an X-ray by default: an eighth gets through.
@@ -237,7 +237,7 @@ impl Parameters {
 
     fn sigma_per_value(&self, volume: &Volume) -> f64 {
         self.sigma_per_value.unwrap_or_else(|| {
-            let mean = (bright_mean(volume) - self.zero_value(volume)).abs();
+            let mean = (volume.bright_mean() - self.zero_value(volume)).abs();
             let mean = if mean > 0.0 { mean } else { 1.0 };
             XRAY_OPTICAL_DEPTH / (mean * scene::mean_side(volume))
         })
@@ -247,12 +247,11 @@ impl Parameters {
         if let Some(window) = &self.window {
             return window.check("/projection/window");
         }
-        let (low, far) = (volume.range()[0], bright_mean(volume));
-        let side = scene::mean_side(volume);
+        let (low, side) = (volume.range()[0], scene::mean_side(volume));
         Ok(match self.mode {
             Mode::Maximum | Mode::Minimum => Window::range(volume),
-            Mode::Mean => Window::of(low, far),
-            Mode::Sum => Window::of(low.min(0.0) * side, far.max(0.0) * side),
+            Mode::Mean => Window::of(low, volume.bright_mean()),
+            Mode::Sum => Window::of(low.min(0.0) * side, volume.bright_mean().max(0.0) * side),
             Mode::Xray => Window::of(0.0, 1.0),
         })
     }

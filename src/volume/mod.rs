@@ -7,6 +7,7 @@
 //! **Values** are `raw · slope + inter`; voxels stay in the type of their file, so that a byte volume takes a byte a
 //! voxel on the device too.
 
+mod bright;
 pub mod builtin;
 mod cache;
 mod inflate;
@@ -35,6 +36,7 @@ pub use voxels::{Histogram, VoxelType, Voxels};
 use crate::error::{Error, Result};
 use glam::{DAffine3, DMat3, DVec3};
 use range::raw_range;
+use std::sync::OnceLock;
 
 /// Voxel spacings outside of this range are taken for damage; in mm these are a picometre and a thousand kilometres.
 const SPACING_RANGE: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
@@ -74,6 +76,7 @@ pub struct Volume {
     range: [f64; 2],
     non_finite: u64,
     histogram: Histogram,
+    bright_mean: OnceLock<f64>,
 }
 
 impl Volume {
@@ -107,7 +110,7 @@ impl Volume {
             None => [0.0; 2],
         };
         let histogram = Histogram::new(&parts.voxels, parts.slope, parts.inter, range);
-        Ok(Self { parts, world_from_index, range, non_finite, histogram })
+        Ok(Self { parts, world_from_index, range, non_finite, histogram, bright_mean: OnceLock::new() })
     }
 
     /// Voxels along x, y, z.
@@ -185,6 +188,11 @@ impl Volume {
     /// How many voxels have which value.
     pub fn histogram(&self) -> &Histogram {
         &self.histogram
+    }
+
+    /// The mean of the finite voxels along a bright ray: what one in fifty of the rays along the grid's axes stays above.
+    pub fn bright_mean(&self) -> f64 {
+        *self.bright_mean.get_or_init(|| bright::bright_mean(self))
     }
 
     /// A name for people.
