@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use super::{ErrorEstimate, Film};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::frame;
 
 /// What is behind the volume.
@@ -29,13 +29,19 @@ impl Film {
             .to_string()
     }
 
-    /// The film as PNG bytes, and how many values were clipped at white.
+    /// The film as PNG bytes, its error, and how many values were clipped at white. Error and colours are worked out side by side:
+    /// a client that turns the camera waits for both.
     ///
     /// # Errors
     /// `Error::Internal` when the encoder fails.
-    pub fn png(&self, error: &ErrorEstimate) -> Result<(Vec<u8>, u64)> {
-        let (bytes, clipped) = self.srgb8();
-        Ok((frame::png(self.size, &bytes, self.description(error))?, clipped))
+    pub fn png(&self) -> Result<(Vec<u8>, ErrorEstimate, u64)> {
+        let (error, (bytes, clipped)) = std::thread::scope(|scope| {
+            let error = scope.spawn(|| self.error());
+            let picture = self.srgb8();
+            (error.join(), picture)
+        });
+        let error = error.map_err(|_| Error::internal("estimating the error panicked"))?;
+        Ok((frame::png(self.size, &bytes, self.description(&error))?, error, clipped))
     }
 
     /// The film as OpenEXR bytes; a transparent one has an alpha channel and is premultiplied, as is usual there.

@@ -32,10 +32,7 @@ pub(super) async fn frames(job: Weak<Job>, engine: Engine) {
         developed_last = Arc::downgrade(&snapshot);
         let developed = tokio::task::spawn_blocking({
             let snapshot = snapshot.clone();
-            move || {
-                let error = snapshot.film.error();
-                snapshot.film.png(&error).map(|(png, clipped)| (png, error, clipped))
-            }
+            move || snapshot.film.png()
         })
         .await;
         job.developing.store(false, Ordering::Release);

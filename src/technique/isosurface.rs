@@ -265,7 +265,10 @@ fn parse(parameters: &Value, at: &str) -> Result<Arc<dyn View>> {
         }
         surfaces::check(surfaces, &format!("{at}/surfaces"))?;
     }
-    let several = parameters.surfaces.as_ref().map_or(parameters.opacity.unwrap_or(1.0) < 1.0, |s| s.len() > 1 || s[0].opacity < 1.0);
+    let several = parameters
+        .surfaces
+        .as_ref()
+        .map_or(parameters.opacity.unwrap_or(1.0) < 1.0, |s| s.len() > 1 || s[0].opacity < 1.0);
     if parameters.sampling == Sampling::Nearest && several {
         let detail = "the plain form has one opaque surface";
         return Err(Error::invalid(format!("{at}/sampling"), detail, "refined, or a single opaque surface"));
@@ -362,7 +365,8 @@ impl View for Parameters {
         // Surfaces are looked for from one end of a step to the other, not at a place within it.
         (view.jittered, view.place) = (0, 0.0);
         let shadowed = self.ambient_occlusion.is_some();
-        let light = self.light.clone().unwrap_or(if shadowed { LightRequest::diffuse_sky() } else { Default::default() });
+        let light =
+            self.light.clone().unwrap_or(if shadowed { LightRequest::diffuse_sky() } else { Default::default() });
         light.apply(camera, view);
     }
 
@@ -370,7 +374,8 @@ impl View for Parameters {
         let [low, high] = volume.range();
         let outside = |s: &&Surface| !(low..=high).contains(&s.isovalue);
         let warning = |s: &Surface| {
-            let message = format!("no voxel is on the other side of {}: the values go from {low} to {high}", s.isovalue);
+            let message =
+                format!("no voxel is on the other side of {}: the values go from {low} to {high}", s.isovalue);
             json!({"code": "isovalue_outside_range", "message": message, "measured": s.isovalue, "bound": [low, high]})
         };
         self.surfaces(volume).iter().filter(outside).map(warning).collect()
