@@ -19,29 +19,38 @@ static inline Real3 decoded(Real3 colour, Real weight) {
 
 // An entry of the table is two words: the opacity's float less its ten lowest bits, which hold the upper bits of blue, its two
 // lowest above (an opacity is at most 1); then 16 bits each of red and green, turned right by 25 and 9 bits.
-static inline Optical optical_entry(global const uchar *table, Int entry) {
+typedef struct { Int word, red_green; } Entry;
+
+static inline Entry entry_at(global const uchar *table, Int index) {
+    Entry e;
+    gather_pairs(table, index, &e.word, &e.red_green);
+    return e;
+}
+
+static inline Optical optical(Entry e) {
     Optical o;
-    Int word, red_green;
-    gather_pairs(table, entry, &word, &red_green);
-    o.alpha = as_Real(word & 0x3ffffc00);
-    Int green = as_Int(rotate(as_UInt(red_green), (UInt)(16u))), blue = as_Int(rotate(as_UInt(word), (UInt)(13u)));
-    o.colour = real3(CHANNEL(red_green, 0x007fff80), CHANNEL(green, 0x007fff80), CHANNEL(blue, 0x007ff800));
+    o.alpha = as_Real(e.word & 0x3ffffc00);
+    Int green = as_Int(rotate(as_UInt(e.red_green), (UInt)(16u))), blue = as_Int(rotate(as_UInt(e.word), (UInt)(13u)));
+    o.colour = real3(CHANNEL(e.red_green, 0x007fff80), CHANNEL(green, 0x007fff80), CHANNEL(blue, 0x007ff800));
     return o;
+}
+
+// Where the table has a raw value in units of `unit`.
+static inline Int index_of(constant const EmissionAbsorption *params, Real raw, float unit) {
+    Real x = mad(raw, (Real)(params->table_scale * unit), (Real)(params->table_offset));
+    return to_int(clamp(x, (Real)(0.0f), (Real)(TABLE_SIZE - 1)));
 }
 
 // The transfer function at a raw value in units of `unit`, with the opacity of a whole step; a NaN is empty.
 static inline Optical classify(constant const EmissionAbsorption *params, global const uchar *table, Real raw, float unit) {
-    Real x = mad(raw, (Real)(params->table_scale * unit), (Real)(params->table_offset));
-    x = clamp(x, (Real)(0.0f), (Real)(TABLE_SIZE - 1));
 #if VOXEL == VOXEL_F32
     Mask nan = MASK(raw != raw);
-    x = select(x, (Real)(0.0f), nan);
-#endif
-    Optical o = optical_entry(table, to_int(x));
-#if VOXEL == VOXEL_F32
+    Optical o = optical(entry_at(table, index_of(params, select(raw, (Real)(0.0f), nan), unit)));
     o.alpha = select(o.alpha, (Real)(0.0f), nan);
-#endif
     return o;
+#else
+    return optical(entry_at(table, index_of(params, raw, unit)));
+#endif
 }
 
 #if SHADED
@@ -74,7 +83,7 @@ static inline Optical classify_2d(constant const EmissionAbsorption *params, glo
     Mask nan = MASK(!(magnitude == magnitude && raw == raw));
     Real v = clamp(mad(raw, (Real)(params->table_scale), (Real)(params->table_offset)), (Real)(0.0f), (Real)(255.0f));
     Real g = clamp(mad(magnitude, (Real)(params->gradient_scale), (Real)(0.5f)), (Real)(0.0f), (Real)(255.0f));
-    Optical o = optical_entry(table, to_int(select(v, (Real)(0.0f), nan)) + (to_int(select(g, (Real)(0.0f), nan)) << 8));
+    Optical o = optical(entry_at(table, to_int(select(v, (Real)(0.0f), nan)) + (to_int(select(g, (Real)(0.0f), nan)) << 8)));
     o.alpha = select(o.alpha, (Real)(0.0f), nan);
     return o;
 }
@@ -150,42 +159,46 @@ static inline void preintegrated_step(constant const View *view, constant const 
 }
 #endif
 
-#ifdef NARROW
-#if SHADED
-#define BLOCK WideBlock
-#define BLOCK_AT wide_block_at
-#define BLOCK_RAW wide_raw
-#else
-#define BLOCK Block
-#define BLOCK_AT block_at
-#define BLOCK_RAW block_raw
-#endif
-// The steps from k to end - 1 of lanes that are close together, as a pipeline: while a step's voxels are on their way, the one
-// before it is interpolated and the one before that composited. Otherwise each would wait for its own loads.
+#if defined(NARROW) && !SHADED
+// The steps from k to end - 1 of lanes that are close together, as a pipeline: while a step's voxels are on their way, those of the
+// one before are permuted, the one before that is looked up and the one before that composited. One after the other, each would
+// wait for the last: the processor looks no further ahead than about a step.
 static inline void narrow_steps(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
                                 global const uchar *table, const Packet *p, int k, int end, Radiance *r) {
-    BLOCK block = BLOCK_AT(view, voxels, convert_int4(p->low + p->low_pace * (float)k));
+    #define BLOCK(step) block_at(view, voxels, convert_int4(p->low + p->low_pace * fmin(step, (float)(end - 1))))
+    #define PLACE(step) along(p->start, p->pace, (Real)(step))
+    float at = (float)k;
+    Block block = BLOCK(at);
+    Edges edges = block_edges(&block, PLACE(at));
+    block = BLOCK(at + 1.0f);
+    Entry entry = {(Int)(0), (Int)(0)}; // of no opacity
+    for (; k < end; k++, at += 1.0f) {
+        composite(params, optical(entry), r);
+        entry = entry_at(table, index_of(params, edges_raw(&edges), INNER_UNIT));
+        edges = block_edges(&block, PLACE(at + 1.0f));
+        block = BLOCK(at + 2.0f);
+    }
+    composite(params, optical(entry), r);
+    #undef BLOCK
+    #undef PLACE
+}
+#elif defined(NARROW)
+// The same of lit samples.
+static inline void narrow_steps(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
+                                global const uchar *table, const Packet *p, int k, int end, Radiance *r) {
+    WideBlock block = wide_block_at(view, voxels, convert_int4(p->low + p->low_pace * (float)k));
     Optical before = {{(Real)(0.0f), (Real)(0.0f), (Real)(0.0f)}, (Real)(0.0f)};
-#if SHADED
     Real3 gradient = before.colour;
-#endif
     for (float at = (float)k; k < end; k++, at += 1.0f) {
-        BLOCK next = BLOCK_AT(view, voxels, convert_int4(p->low + p->low_pace * fmin(at + 1.0f, (float)(end - 1))));
-        Real3 place = along(p->start, p->pace, (Real)(at));
-        Optical o = classify(params, table, BLOCK_RAW(&block, place), INNER_UNIT);
-#if SHADED
-        Real3 steep = gradient;
+        WideBlock next = wide_block_at(view, voxels, convert_int4(p->low + p->low_pace * fmin(at + 1.0f, (float)(end - 1))));
+        Real3 place = along(p->start, p->pace, (Real)(at)), steep = gradient;
+        Optical o = classify(params, table, wide_raw(&block, place), INNER_UNIT);
         if (any_lane(MASK(o.alpha > 0.0f))) steep = wide_gradient(&block, place);
         if (any_lane(MASK(before.alpha > 0.0f))) before.colour = lit(view, p, scale3(gradient, (Real)(INNER_UNIT)), before.colour);
-        gradient = steep;
-#endif
         composite(params, before, r);
-        before = o;
-        block = next;
+        before = o, gradient = steep, block = next;
     }
-#if SHADED
     before.colour = lit(view, p, scale3(gradient, (Real)(INNER_UNIT)), before.colour);
-#endif
     composite(params, before, r);
 }
 #endif

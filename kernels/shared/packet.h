@@ -12,7 +12,7 @@
 #endif
 #define PACKETS (BEAM_W * BEAM_H)
 // Samples between two looks at the cells and at which packets are still going.
-#define STRIDE 4
+#define STRIDE 8
 
 #define MAX_LIGHTS 4
 
