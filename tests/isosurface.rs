@@ -1,0 +1,26 @@
+//! `isosurface` against a double-precision host reference of where rays cross, closed forms of light and layers, and what is asked.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test says what is wrong by panicking")]
+
+mod common;
+
+#[path = "isosurface/agreement.rs"]
+mod agreement;
+#[path = "isosurface/asked.rs"]
+mod asked;
+#[path = "isosurface/convergence.rs"]
+mod convergence;
+#[path = "isosurface/depth.rs"]
+mod depth;
+#[allow(dead_code, reason = "of another technique's reference, the grid and its interpolants")]
+#[path = "projection/grid.rs"]
+mod grid;
+#[path = "isosurface/layers.rs"]
+mod layers;
+#[path = "isosurface/light.rs"]
+mod light;
+#[path = "isosurface/occlusion.rs"]
+mod occlusion;
+#[allow(dead_code, reason = "of another technique's reference, the camera and the box")]
+#[path = "emission_absorption/oracle.rs"]
+mod rays;
