@@ -146,11 +146,15 @@ const WALK: &str = r#"{"technique": "projection", "volume": {"builtin": "sphere"
     "image": {"width": 9, "height": 7}, "budget": {"samples": 1}, "projection": {"mode": "xray"}}"#;
 const SLICE: &str = r#"{"technique": "slice", "volume": {"builtin": "sphere", "resolution": 8},
     "image": {"width": 9, "height": 7}, "budget": {"samples": 2}, "slice": {"thickness": 0.3, "mode": "maximum"}}"#;
+const ISOSURFACE: &str = r#"{"technique": "isosurface", "volume": {"builtin": "sphere", "resolution": 12},
+    "image": {"width": 9, "height": 7}, "budget": {"samples": 2}, "isosurface": {"ambient_occlusion": {"rays": 2}}}"#;
+const LAYERS: &str = r#"{"technique": "isosurface", "volume": {"builtin": "gaussian", "resolution": 8}, "image": {"width": 9, "height": 7},
+    "budget": {"samples": 1}, "isosurface": {"surfaces": [{"isovalue": 0.3, "opacity": 0.5}, {"isovalue": 0.6}], "normals": "analytic"}}"#;
 
 #[test]
 fn a_tiny_case_of_each_kernel_is_clean_under_oclgrind() {
     for lanes in ["1", "4"] {
-        for scene in [VIEW, FIELD, PROJECTION, WALK, SLICE] {
+        for scene in [VIEW, FIELD, PROJECTION, WALK, SLICE, ISOSURFACE, LAYERS] {
             assert_eq!(oclgrind(scene, lanes, None).trim(), "", "{lanes} lanes: {scene}");
         }
     }

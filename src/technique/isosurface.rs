@@ -23,6 +23,7 @@
 //!
 //! Example: see [`example`], which a test runs.
 
+pub mod plan;
 pub mod surfaces;
 
 use std::sync::Arc;
@@ -31,25 +32,13 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::{CellUse, Kind, Technique, View, ViewPlan};
-use crate::device::program::{Source, Variant};
-use crate::device::structs::{DeviceStruct, View as DeviceView};
+use super::{Kind, Technique, View};
 use crate::device_struct;
 use crate::error::{Error, Result};
 use crate::request;
-use crate::scene;
-use crate::scene::camera::Camera;
 use crate::scene::interpolation::Interpolation;
 use crate::scene::light::LightRequest;
-use crate::volume::{Volume, VoxelType};
 use surfaces::{MOST_SURFACES, Surface};
-
-/// How closely a crossing is located, in voxels.
-const TOLERANCE_VOXELS: f64 = 1e-4;
-/// The same in parts of the way through the volume: what single precision can tell apart, a few times over.
-const TOLERANCE_OF_WAY: f64 = 3e-7;
-/// A ray through transparent surfaces ends at this opacity.
-const OPACITY_THRESHOLD: f64 = 0.999;
 
 /// The technique's line in the list.
 pub const TECHNIQUE: Technique = Technique {
@@ -57,7 +46,7 @@ pub const TECHNIQUE: Technique = Technique {
     summary: "Surfaces of equal value, met to a ten-thousandth of a voxel and lit by their gradient",
     schema: request::schema_of::<Parameters>,
     example,
-    source,
+    source: plan::source,
     kind: Kind::View(parse),
 };
 
@@ -198,56 +187,6 @@ pub fn example() -> Value {
     })
 }
 
-type Features = [(&'static str, i32); 2];
-
-const fn features(interpolation: Interpolation, layered: bool) -> Features {
-    [("INTERPOLATION", interpolation.code()), ("LAYERED", layered as i32)]
-}
-
-/// Every set of features that may be built; the first is built before the service is ready.
-static FEATURES: [Features; 7] = {
-    use Interpolation::{BSpline, CatmullRom, Nearest, Trilinear};
-    [
-        features(Trilinear, false),
-        features(Trilinear, true),
-        features(Nearest, false),
-        features(BSpline, false),
-        features(BSpline, true),
-        features(CatmullRom, false),
-        features(CatmullRom, true),
-    ]
-};
-
-const TYPES: [VoxelType; 4] = [VoxelType::U8, VoxelType::I16, VoxelType::U16, VoxelType::F32];
-
-fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
-    Variant { kernel: TECHNIQUE.name, voxel: Some(voxel), features }
-}
-
-fn source() -> Source {
-    Source {
-        kernel: TECHNIQUE.name,
-        headers: &[
-            "shared/lanes.h",
-            "shared/rng.h",
-            "shared/camera.h",
-            "shared/voxel.h",
-            "shared/volume.h",
-            "shared/inner.h",
-            "shared/block.h",
-            "shared/packet.h",
-            "shared/shade.h",
-            "shared/crossing.h",
-            "shared/film.h",
-        ],
-        structs: || DeviceView::opencl_text() + &Isosurface::opencl_text(),
-        arguments: 7,
-        volume: Some(2),
-        variants: || FEATURES.iter().flat_map(|f| TYPES.map(|t| variant(t, f))).collect(),
-        common: TYPES.len(),
-    }
-}
-
 fn parse(parameters: &Value, at: &str) -> Result<Arc<dyn View>> {
     let parameters: Parameters = request::parse(parameters, &(TECHNIQUE.schema)(), at)?;
     if let Some(light) = &parameters.light {
@@ -283,101 +222,4 @@ fn parse(parameters: &Value, at: &str) -> Result<Arc<dyn View>> {
         return Err(Error::invalid(format!("{at}/interpolation"), detail, "nearest, or sampling refined"));
     }
     Ok(Arc::new(parameters))
-}
-
-impl Parameters {
-    fn interpolation(&self) -> Interpolation {
-        match self.sampling {
-            Sampling::Nearest => Interpolation::Nearest,
-            Sampling::Refined => self.interpolation.unwrap_or(Interpolation::Trilinear),
-        }
-    }
-
-    /// The surfaces by ascending raw value.
-    fn surfaces(&self, volume: &Volume) -> Vec<Surface> {
-        let mut surfaces = self.surfaces.clone().unwrap_or_else(|| {
-            let isovalue = self.isovalue.unwrap_or_else(|| surfaces::default_isovalue(volume));
-            vec![Surface::new(isovalue, self.color, self.opacity)]
-        });
-        surfaces.sort_by(|a, b| (a.isovalue * volume.slope()).total_cmp(&(b.isovalue * volume.slope())));
-        surfaces
-    }
-
-    fn layered(&self, surfaces: &[Surface]) -> bool {
-        surfaces.len() > 1 || self.output == Output::Color && surfaces[0].opacity < 1.0
-    }
-
-    /// Values that a cell has to have for a crossing in it.
-    fn wanted(&self, surfaces: &[Surface]) -> Vec<[f64; 2]> {
-        let least = surfaces.iter().map(|s| s.isovalue).fold(f64::INFINITY, f64::min);
-        match self.sampling {
-            Sampling::Nearest => vec![[least, f64::MAX]],
-            Sampling::Refined => surfaces.iter().map(|s| [s.isovalue; 2]).collect(),
-        }
-    }
-}
-
-impl View for Parameters {
-    fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
-        let surfaces = self.surfaces(volume);
-        let wanted = features(self.interpolation(), self.layered(&surfaces));
-        let features = FEATURES.iter().find(|f| **f == wanted).unwrap_or(&FEATURES[0]);
-        let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
-        let values: Vec<String> = surfaces.iter().map(|s| format!("{:.4}", s.isovalue)).collect();
-        let mut reasons = vec![format!("isovalues: {}", values.join(", "))];
-        if !self.empty_space_skipping {
-            reasons.push("every sample is taken: skipping is off".into());
-        }
-        Ok(ViewPlan {
-            variant: variant(volume.voxel_type(), features),
-            cells: if self.empty_space_skipping { CellUse::Distances(self.wanted(&surfaces)) } else { CellUse::None },
-            step: (self.step_voxels * smallest) as f32,
-            opacity_threshold: if self.layered(&surfaces) { OPACITY_THRESHOLD } else { 1.0 },
-            reasons,
-        })
-    }
-
-    fn parameters(&self, volume: &Volume, _camera: &Camera) -> Result<Vec<u8>> {
-        let surfaces = self.surfaces(volume);
-        let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
-        let occlusion = self.ambient_occlusion.as_ref();
-        let mut device = Isosurface {
-            sign: volume.slope().signum() as f32,
-            surfaces: surfaces.len() as i32,
-            transmittance_floor: (1.0 - OPACITY_THRESHOLD) as f32,
-            tolerance: (TOLERANCE_VOXELS * smallest).max(TOLERANCE_OF_WAY * scene::radius(volume)) as f32,
-            analytic: i32::from(self.normals == Normals::Analytic),
-            depth: i32::from(self.output == Output::Depth),
-            occlusion_rays: occlusion.map_or(0, |o| o.rays as i32),
-            occlusion_radius: occlusion.and_then(|o| o.radius).unwrap_or(0.1 * scene::mean_side(volume)) as f32,
-            occlusion_start: (0.5 * smallest) as f32,
-            ..Isosurface::default()
-        };
-        for (i, surface) in surfaces.iter().enumerate() {
-            device.isovalue[i] = ((surface.isovalue - volume.inter()) / volume.slope()) as f32;
-            device.color[3 * i..3 * i + 3].copy_from_slice(&surface.color.map(|c| c as f32));
-            device.opacity[i] = if self.output == Output::Depth { 1.0 } else { surface.opacity as f32 };
-        }
-        Ok(bytemuck::bytes_of(&device).to_vec())
-    }
-
-    fn look(&self, camera: &Camera, view: &mut DeviceView) {
-        // Surfaces are looked for from one end of a step to the other, not at a place within it.
-        (view.jittered, view.place) = (0, 0.0);
-        let shadowed = self.ambient_occlusion.is_some();
-        let light =
-            self.light.clone().unwrap_or(if shadowed { LightRequest::diffuse_sky() } else { Default::default() });
-        light.apply(camera, view);
-    }
-
-    fn warnings(&self, volume: &Volume) -> Vec<Value> {
-        let [low, high] = volume.range();
-        let outside = |s: &&Surface| !(low..=high).contains(&s.isovalue);
-        let warning = |s: &Surface| {
-            let message =
-                format!("no voxel is on the other side of {}: the values go from {low} to {high}", s.isovalue);
-            json!({"code": "isovalue_outside_range", "message": message, "measured": s.isovalue, "bound": [low, high]})
-        };
-        self.surfaces(volume).iter().filter(outside).map(warning).collect()
-    }
 }

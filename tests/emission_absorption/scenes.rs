@@ -70,8 +70,8 @@ fn a_background_shows_through_and_transparency_is_alpha() {
     let mut request = scene(&constant(), white(0.5));
     let through = (-1.0f64).exp();
     let decoded = |request: &Value| {
-        let (film, error) = house.film(request);
-        image::load_from_memory(&film.png(&error).unwrap().0).unwrap()
+        let (film, _) = house.film(request);
+        image::load_from_memory(&film.png().unwrap().0).unwrap()
     };
     let encode = |v: f64| ((1.055 * v.powf(1.0 / 2.4) - 0.055) * 255.0).round() as i32;
     request["image"]["background"] = json!([0.1, 0.5, 1]);
