@@ -15,7 +15,8 @@ fn views(span: f64) -> [(Camera, DVec3); 3] {
         |(normal, along)| {
             let normal = normal.normalize();
             let target = normal * along;
-            let camera = Camera { eye: target + normal * 3.0, target, up: dvec3(0.1, 0.3, 0.2), span, perspective: false };
+            let camera =
+                Camera { eye: target + normal * 3.0, target, up: dvec3(0.1, 0.3, 0.2), span, perspective: false };
             (camera, normal)
         },
     )
@@ -47,7 +48,12 @@ fn marschner_lobb_ranks_them_as_the_literature_does() {
         let values = values(&volume, name, 2.0, 2.0 * 2.0 / 40.0);
         rms(values.into_iter().map(|(p, v)| v - marschner_lobb_value(p.x, p.y, p.z)))
     });
-    println!("{errors:?}");
+    let [nearest, trilinear, b_spline, catmull_rom] = errors;
+    assert!(catmull_rom < 0.8 * trilinear, "{errors:?}");
+    // The one without a prefilter blurs: at this frequency it loses more than the kinks of the linear one do.
+    assert!(1.25 * trilinear < b_spline && b_spline < 0.97 * nearest, "{errors:?}");
+    // The ripple itself has a root mean square of 0.07: even the worst is nearer than a volume without it.
+    assert!(nearest < 0.06, "{errors:?}");
 }
 
 const WAVE: [DVec3; 2] = [dvec3(2.3, -1.1, 1.7), dvec3(-1.3, 2.9, 0.8)];
@@ -76,22 +82,19 @@ fn errors_fall_with_the_voxels_at_each_ones_order() {
     {
         let error = |n| rms(sampled(n, name).into_iter().map(|(p, v)| v - smooth(p)));
         let errors = [16, 32, 64].map(error);
-        println!("{name} {errors:?}");
         for pair in errors.windows(2) {
             let order = (pair[0] / pair[1]).log2();
-            println!("{name} {order}");
             assert!((least..most).contains(&order), "{name}: {order} from {errors:?}");
         }
     }
 }
 
-/// Each of the two smooths in its own way: what is left out is known to the leading term.
+/// Without a prefilter its error is known to the leading term: h²/6 times the second derivatives.
 #[test]
 fn the_b_spline_blurs_by_a_sixth_of_the_laplacian() {
     let h = 2.0 / 64.0;
     let values = sampled(64, "b_spline");
     let blur = rms(values.iter().map(|(p, _)| h * h / 6.0 * laplacian(*p)));
     let beyond = rms(values.iter().map(|(p, v)| v - smooth(*p) - h * h / 6.0 * laplacian(*p)));
-    println!("{blur} {beyond}");
-    assert!(beyond < 0.02 * blur, "{beyond} of {blur}");
+    assert!(beyond < 0.005 * blur, "{beyond} of {blur}");
 }

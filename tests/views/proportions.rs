@@ -1,10 +1,13 @@
 //! Millimetres are millimetres along every axis, however long the voxels are, and however many.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
-use glam::DVec3;
+use cloudchamber::film::{ErrorEstimate, Film};
+use glam::{DVec3, dvec3};
 use serde_json::{Value, json};
 
+use super::common::engine::House;
 use super::support::{Camera, grid, pixels, request};
 
 /// So many that counting them is good for an area: at 48 the count of a true disc is up to 1 % off.
@@ -113,5 +116,59 @@ fn its_least_value_along_a_ray_and_its_slice_are_round_too() {
             assert_round(&inside, &what);
             assert_distances(&film, &camera, &what);
         }
+    }
+}
+
+/// Soft blobs that fade out well within the cube from -1 to 1, from so many voxels along each axis.
+fn blobs(n: usize, shift: DVec3) -> Value {
+    let blob = |p: DVec3, at: DVec3, width: f64| (-(p - shift - at).length_squared() / (width * width)).exp();
+    grid([n; 3], [2.0 / n as f64; 3], |p| {
+        blob(p, dvec3(0.15, -0.1, 0.05), 0.4) + 0.8 * blob(p, dvec3(-0.3, 0.25, -0.2), 0.3)
+    })
+}
+
+/// Unshaded, shaded and a surface.
+fn forms() -> [(&'static str, Value); 3] {
+    let points = json!([
+        {"value": 0.1, "color": [1, 0.3, 0.1], "opacity_per_unit": 0},
+        {"value": 0.6, "color": [0.2, 0.9, 0.4], "opacity_per_unit": 2},
+        {"value": 1.1, "color": [0.3, 0.4, 1], "opacity_per_unit": 4}
+    ]);
+    [
+        ("emission_absorption", json!({"transfer_function": {"points": points}})),
+        ("emission_absorption", json!({"transfer_function": {"points": points}, "shading": true})),
+        ("isosurface", json!({"isovalue": 0.5})),
+    ]
+}
+
+/// A picture of the blobs; the step is given in the world, so that it is the same whatever the voxels.
+fn of_blobs(n: usize, shift: DVec3, step: f64, (technique, parameters): &(&str, Value)) -> (Arc<Film>, ErrorEstimate) {
+    let camera = json!({"eye": [1.9, 1.1, 2.3], "fov_y_deg": 34});
+    let mut request = request(technique, &blobs(n, shift), &camera, 32, parameters.clone());
+    request[technique]["step_voxels"] = (step * n as f64 / 2.0).into();
+    request["budget"]["samples"] = 64.into();
+    House::shared().film(&request)
+}
+
+#[test]
+fn twice_the_voxels_show_the_same() {
+    let step = 1.0 / 16.0;
+    for form in forms() {
+        let of = |n| of_blobs(n, DVec3::ZERO, step, &form);
+        let [(coarsest, _), (coarse, error), (fine, _)] = [16, 32, 64].map(of);
+        let (before, off) = (coarsest.difference(&coarse).unwrap(), coarse.difference(&fine).unwrap());
+        let order = (before / off).log2();
+        assert!((1.7..2.3).contains(&order), "{form:?}: order {order}, {before} and {off}");
+        // So the interpolation's own error is a quarter of what twice the side made; the rest is what the film says of itself.
+        let bound = error.total + before / 4.0;
+        assert!(error.total < 0.06, "{form:?}: an error of {} would bound anything", error.total);
+        assert!(off < bound, "{form:?}: {off} for {bound}");
+        let (halved, _) = of_blobs(64, DVec3::ZERO, 0.5 * step, &form);
+        let off = coarse.difference(&halved).unwrap();
+        assert!(off < bound, "{form:?}, half the step: {off} for {bound}");
+        // Half a voxel's shift, the commonest mistake of resampling, is beyond it.
+        let (shifted, _) = of_blobs(64, DVec3::splat(0.5 * step), step, &form);
+        let off = coarse.difference(&shifted).unwrap();
+        assert!(off > 2.0 * bound, "{form:?}: {off} is not beyond {bound}");
     }
 }
