@@ -79,9 +79,10 @@ fn draw(file: &str, title: &str, x: &str, lines: &[Line]) {
         series.label(label).legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(2)));
         chart.draw_series(line.points.iter().map(|p| Circle::new(*p, 3, colour.filled()))).unwrap();
     }
+    let falls = lines[0].growth() < 0.0;
     chart
         .configure_series_labels()
-        .position(SeriesLabelPosition::UpperLeft)
+        .position(if falls { SeriesLabelPosition::UpperRight } else { SeriesLabelPosition::UpperLeft })
         .background_style(WHITE.mix(0.8))
         .draw()
         .unwrap();
