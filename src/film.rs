@@ -90,6 +90,10 @@ pub struct Film {
     pub main: Samples,
     /// The control, if there is one yet.
     pub control: Option<Samples>,
+    /// Whether a sample of the control is that of the same number of the others but for its step: nothing random is in them.
+    pub paired: bool,
+    /// Whether the step plays no part in the picture: there is no error of it.
+    pub stepless: bool,
     /// Opacity at which rays end.
     pub opacity_threshold: f64,
     /// Relative change of the picture since the field had half its histories.
@@ -110,6 +114,7 @@ impl Film {
         let truncation = self.truncation();
         let (discretisation, joint) = match (&self.control, self.main.stride) {
             (Some(control), 1) => self.against(control),
+            _ if self.stepless => (Some(0.0), None),
             _ => (None, None),
         };
         let resolution = (self.main.stride > 1).then(|| self.main.resolution_error());
@@ -128,7 +133,9 @@ impl Film {
 
     /// The difference to the control, whose step is twice as long. A method of first order or better is at most this wrong:
     /// |I(h) − I| ≤ |I(2h) − I(h)|. With two samples or more the noise of both is taken off and the rest is discretisation;
-    /// with one sample the two cannot be told apart, and the second value is both together.
+    /// with one sample the two cannot be told apart, and the second value is both together. Samples that are paired have their
+    /// noise in common: what the m of the control and the n proper differ by without a change of step is that of the n − m that
+    /// only one has, with a variance of 1/m − 1/n of a sample's.
     fn against(&self, control: &Samples) -> (Option<f64>, Option<f64>) {
         let n = f64::from(self.main.count);
         let m = f64::from(control.count);
@@ -137,7 +144,8 @@ impl Film {
             for x in 0..control.width {
                 let at = (y * control.stride) * self.main.width + x * control.stride;
                 squared += (self.main.luminance(at) - control.luminance(y * control.width + x)).powi(2);
-                noise += self.main.variance(at) * (1.0 / n + 1.0 / m);
+                noise +=
+                    self.main.variance(at) * if self.paired { (1.0 / m - 1.0 / n).abs() } else { 1.0 / n + 1.0 / m };
                 pixels += 1;
             }
         }
@@ -210,6 +218,22 @@ mod tests {
             (error.discretisation.unwrap_or(0.0) - 0.2).abs() < 1e-5 && (error.total - 0.2).abs() < 1e-5,
             "{error:?}"
         );
+    }
+
+    #[test]
+    fn paired_samples_have_their_noise_in_common() {
+        // As many samples of both: what they differ by is the step's doing, whatever the noise.
+        let sample = |luminance: f32| samples(1, 4, &[luminance; 4], 3.0 * 0.09);
+        let film = |paired: bool| Film {
+            size: [2, 2],
+            main: sample(0.5),
+            control: Some(sample(0.6)),
+            paired,
+            opacity_threshold: 1.0,
+            ..Film::default()
+        };
+        assert!((film(true).error().discretisation.unwrap_or(0.0) - 0.2).abs() < 1e-5);
+        assert_eq!(film(false).error().discretisation, Some(0.0));
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! A view on the device: its buffers and the order of its passes.
 //!
-//! First the control: every fourth pixel at twice the step, which is also the first picture. The passes proper follow, and the
-//! control gets another sample each time their number has doubled, so that it always costs little and knows enough.
+//! First the control: every eighth pixel at twice the step, which is also the first picture. The passes proper follow, and the
+//! control gets another sample each time their number has doubled, so that it always costs little and knows enough; where nothing
+//! but the step tells the two apart, it gets one for each.
 
 use std::rc::Rc;
 use std::time::Duration;
@@ -189,9 +190,21 @@ impl ViewRun {
         &self.plan
     }
 
+    /// Whether a sample of the control differs from the one of its number in the passes proper by its step alone.
+    fn paired(&self) -> bool {
+        self.view.jittered == 0
+    }
+
     fn next_pass(&self) -> Pass {
         let [control, main] = &self.layers;
-        let owed = if main.samples < 2 { 1 } else { 1 + main.samples.ilog2() };
+        let owed = match main.samples {
+            // The first picture; there is nothing to control.
+            _ if self.plan.stepless => 1,
+            // Paired with the passes proper: only so does noise not pass for the step's doing, nor hide it.
+            n if self.paired() => n + 1,
+            0 | 1 => 1,
+            n => 1 + n.ilog2(),
+        };
         if control.samples < owed { Pass::Control } else { Pass::Main }
     }
 
@@ -274,9 +287,18 @@ impl ViewRun {
             })
         };
         let shown = if main.samples > 0 { main } else { control };
-        let control = (shown.stride == 1 && control.samples > 0).then(|| read(control)).transpose()?;
+        let controlled = shown.stride == 1 && control.samples > 0 && !self.plan.stepless;
+        let control = controlled.then(|| read(control)).transpose()?;
         let opacity_threshold = self.plan.opacity_threshold;
-        Ok(Film { size: self.size, main: read(shown)?, control, opacity_threshold, ..Film::default() })
+        Ok(Film {
+            size: self.size,
+            main: read(shown)?,
+            control,
+            paired: self.paired(),
+            stepless: self.plan.stepless,
+            opacity_threshold,
+            ..Film::default()
+        })
     }
 
     /// Samples that were not finite.

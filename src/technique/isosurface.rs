@@ -182,8 +182,8 @@ pub fn example() -> Value {
         "technique": "isosurface",
         "volume": {"builtin": "marschner_lobb", "resolution": 64},
         "image": {"width": 128, "height": 128},
-        "budget": {"samples": 4},
-        "isosurface": {"isovalue": 0.5, "color": [0.8, 0.5, 0.3], "ambient_occlusion": {"radius": 0.2}}
+        "budget": {"samples": 16},
+        "isosurface": {"isovalue": 0.5, "color": [0.8, 0.5, 0.3], "step_voxels": 0.5, "ambient_occlusion": {"radius": 0.2}}
     })
 }
 

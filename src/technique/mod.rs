@@ -111,6 +111,8 @@ pub struct ViewPlan {
     pub cells: CellUse,
     /// The step of the finest pass, world units.
     pub step: f32,
+    /// Whether the step plays no part in the picture.
+    pub stepless: bool,
     /// Past this opacity a ray ends; what it leaves out is part of the error.
     pub opacity_threshold: f64,
     /// Why it is planned so, in words.

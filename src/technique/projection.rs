@@ -276,6 +276,7 @@ impl View for Parameters {
             variant: variant(volume.voxel_type(), features),
             cells: CellUse::Ranges,
             step: (if self.walked() { 1.0 } else { self.step_voxels } * smallest) as f32,
+            stepless: self.walked(),
             opacity_threshold: 1.0,
             reasons,
         })

@@ -125,6 +125,7 @@ impl View for Parameters {
             variant: variant(volume.voxels().voxel_type(), self.features()),
             cells: if skip { CellUse::Distances(opaque) } else { CellUse::None },
             step: (self.step_voxels * smallest) as f32,
+            stepless: false,
             opacity_threshold: self.threshold(),
             reasons,
         })

@@ -118,6 +118,7 @@ impl View for Parameters {
             variant: variant(volume.voxel_type(), features),
             cells: if self.empty_space_skipping { CellUse::Distances(self.wanted(&surfaces)) } else { CellUse::None },
             step: (self.step_voxels * smallest) as f32,
+            stepless: false,
             opacity_threshold: if self.layered(&surfaces) { OPACITY_THRESHOLD } else { 1.0 },
             reasons,
         })
