@@ -13,6 +13,7 @@ import { Status } from './status.js';
 import { Techniques } from './techniques.js';
 import { TransferEditor } from './transfer.js';
 import { Volumes } from './volumes.js';
+import { showValues } from './widgets.js';
 
 const REPLACE_DELAY_MS = 150; // controls settle before a new render is made
 const REPLACE_AT_LATEST_MS = 500; // but a long drag of a slider is followed all the same
@@ -108,6 +109,7 @@ async function volumeChosen() {
     const shown = volumes.select.value;
     const subject = await volumes.subject();
     if (shown !== volumes.select.value) return;
+    showValues(subject.range);
     transfer.setVolume(subject);
   } catch (error) {
     showProblem(error, 'The volume’s histogram');

@@ -77,11 +77,11 @@ export function vectorItems(schema, root) {
 export const optionsOf = (schema) => schema.options
   ?? schema.enum.filter((value) => value !== null).map((value) => ({ value }));
 
-/** A closed range for a slider, or null. */
+/** A closed range for a slider, or null: a range that says no more than "a number" makes none. */
 export function rangeOf(schema) {
   const low = schema.minimum ?? schema.exclusiveMinimum;
   const high = schema.maximum ?? schema.exclusiveMaximum;
-  return Number.isFinite(low) && Number.isFinite(high) && high > low ? { low, high } : null;
+  return Number.isFinite(low) && Number.isFinite(high) && high > low && (low >= 0 || high - low < 1e9) ? { low, high } : null;
 }
 
 const UNITS = [

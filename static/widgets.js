@@ -7,6 +7,14 @@ import { optionsOf, rangeOf, vectorItems } from './schema.js';
 const SLIDER_STEPS = 400;
 const COLOUR_NAMES = /colou?r|background|albedo|tint/i; // three numbers of such a name are linear sRGB
 
+/** The values of the volume that is shown: the range of sliders whose schema says `x-slider: values`. */
+const volumeValues = { low: 0, high: 1 };
+
+export function showValues([low, high]) {
+  Object.assign(volumeValues, { low, high: high > low ? high : low + 1 });
+  document.dispatchEvent(new Event('volumevalues'));
+}
+
 export function make(tag, properties = {}, ...children) {
   const element = document.createElement(tag);
   const { dataset, ...rest } = properties;
@@ -38,8 +46,7 @@ export function numberWidget(schema, { id, pointer, changed }) {
   const high = schema.maximum ?? schema.exclusiveMaximum;
   if (Number.isFinite(low)) box.min = low;
   if (Number.isFinite(high)) box.max = high;
-  const range = rangeOf(schema);
-  const slide = range && travel(range);
+  const range = schema['x-slider'] === 'values' ? volumeValues : rangeOf(schema);
   const slider = range && make('input', {
     type: 'range', min: 0, max: SLIDER_STEPS, step: 1, tabIndex: -1, ariaHidden: 'true',
   });
@@ -47,12 +54,14 @@ export function numberWidget(schema, { id, pointer, changed }) {
   const place = () => {
     if (!slider) return;
     const value = box.value === '' ? range.low : Number(box.value);
-    slider.value = Math.round(SLIDER_STEPS * slide.at(Math.max(range.low, Math.min(range.high, value))));
+    slider.value = Math.round(SLIDER_STEPS * travel(range).at(Math.max(range.low, Math.min(range.high, value))));
     slider.classList.toggle('unset', box.value === '');
   };
   box.addEventListener('input', place);
   box.addEventListener('change', changed);
+  if (schema['x-slider']) document.addEventListener('volumevalues', place);
   slider?.addEventListener('input', () => {
+    const slide = travel(range);
     let value = slide.value(slider.value / SLIDER_STEPS);
     const digits = range.high - range.low > 20 || integer ? 3 : 4;
     value = integer ? Math.round(value) : Number(value.toPrecision(digits));

@@ -131,7 +131,7 @@ pub struct AmbientOcclusion {
 #[serde(deny_unknown_fields)]
 pub struct Parameters {
     /// The value of the surface. Default: what suits the volume.
-    #[schemars(range(min = -1e30, max = 1e30))]
+    #[schemars(range(min = -1e30, max = 1e30), extend("x-slider" = "values"))]
     isovalue: Option<f64>,
     /// Linear red, green, blue. Default: ivory.
     #[schemars(inner(range(min = 0, max = 1)))]

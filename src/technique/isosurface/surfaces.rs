@@ -19,7 +19,7 @@ const BONE_HOUNSFIELD: f64 = 300.0;
 #[serde(deny_unknown_fields)]
 pub struct Surface {
     /// The value on it.
-    #[schemars(range(min = -1e30, max = 1e30))]
+    #[schemars(range(min = -1e30, max = 1e30), extend("x-slider" = "values"))]
     pub isovalue: f64,
     /// Linear red, green, blue.
     #[serde(default = "ivory")]
