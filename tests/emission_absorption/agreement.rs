@@ -75,6 +75,37 @@ fn every_number_of_lanes_gives_the_same_picture() {
     }
 }
 
+/// Bytes that look random, as an NRRD file on [−1, 1]³.
+fn bytes(dims: [usize; 3]) -> Vec<u8> {
+    let [x, y, z] = dims;
+    let spacing = dims.map(|n| (2.0 / n as f64).to_string()).join(" ");
+    let header =
+        format!("NRRD0004\ntype: uint8\ndimension: 3\nsizes: {x} {y} {z}\nspacings: {spacing}\nencoding: raw\n\n");
+    let mut file = header.into_bytes();
+    file.extend((0..x * y * z).map(|i| (i as u32).wrapping_mul(2_654_435_761).rotate_right(13) as u8));
+    file
+}
+
+#[test]
+fn grids_about_as_small_as_what_lanes_read_together_are_the_same_for_one_lane() {
+    // Lanes that are close together read blocks of 4³ voxels, lit ones of 6³: from there on, and below, nothing is read beyond the grid.
+    let (reference, plain) = (House::shared(), House::new(Some(1)));
+    for dims in
+        [[3, 3, 3], [4, 4, 4], [5, 4, 6], [5, 5, 5], [6, 6, 6], [7, 6, 9], [4, 16, 16], [16, 5, 16], [16, 16, 6]]
+    {
+        let volumes = [&plain, reference].map(|house| house.file(bytes(dims)));
+        for parameters in [json!({}), json!({"shading": true})] {
+            let mut own = json!({"transfer_function": {"preset": "ramp"}, "step_voxels": 0.25});
+            own.as_object_mut().unwrap().extend(parameters.as_object().unwrap().clone());
+            let one = plain.film(&request(&volumes[0], 1, own.clone())).0;
+            let many = reference.film(&request(&volumes[1], 1, own)).0;
+            let difference = worst(&one, &many);
+            assert!(difference < 1.0 / 255.0, "{dims:?}, {parameters}: {difference:e}");
+            assert!(one.main.mean.iter().any(|v| *v > 0.1), "{dims:?}: nothing to see");
+        }
+    }
+}
+
 #[test]
 fn the_same_request_gives_the_same_bytes() {
     let house = House::shared();

@@ -62,7 +62,7 @@ fn every_number_of_lanes_gives_the_same_picture() {
     }
 }
 
-/// The MRI head with its scale turned round: raw values as they are, values 200 − v.
+/// A NIfTI file of a bright middle whose scale falls: values are 200 − raw.
 fn falling() -> Vec<u8> {
     let (nx, ny, nz) = (32usize, 30usize, 28usize);
     let mut header = vec![0u8; 352];
