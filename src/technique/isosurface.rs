@@ -5,6 +5,7 @@
 //! A ray looks at the value at the ends of its steps; where the isovalue lies between the two, the crossing is refined by regula
 //! falsi in the Illinois form (Dowell & Jarratt, BIT 11, 1971) to a ten-thousandth of a voxel. No surface is missed around
 //! anything that is thicker than a step. Macro-cells whose values are all on one side cost nothing.
+//! Where a GPU reads volumes as images, its sampler's weights have 8 fractional bits, and so has the crossing (`/v1/device` says which).
 //! The surface's normal is the gradient there, lit from both sides by Lambert's law and Blinn-Phong.
 //!
 //! | parameter | unit | range | default |
