@@ -1,8 +1,8 @@
 //! A view on the device: its buffers and the order of its passes.
 //!
-//! First the control: every eighth pixel at twice the step, which is also the first picture. The passes proper follow, and the
-//! control gets another sample each time their number has doubled, so that it always costs little and knows enough; where nothing
-//! but the step tells the two apart, it gets one for each.
+//! First the control: every eighth pixel, more of a small picture, at twice the step, which is also the first picture. The passes
+//! proper follow, and the control gets another sample each time their number has doubled, so that it always costs little and knows
+//! enough; where nothing but the step tells the two apart, it gets one for each.
 
 use std::rc::Rc;
 use std::time::Duration;
@@ -23,10 +23,8 @@ use crate::volume::Volume;
 const LEAST_STEP_VOXELS: f64 = 0.05;
 /// A picture is not shown before its first pass where that is likely to take less than this.
 const QUICK_MS: f64 = 50.0;
-/// Stride of the control, and of that of a picture whose shorter side is below `SMALL`.
-const CONTROL: usize = 8;
-const CONTROL_SMALL: usize = 2;
-const SMALL: usize = 200;
+/// Stride of the control by the picture's shorter side: from 400 on, from 200 on, below. A thousand pixels and more tell the error.
+const CONTROL: [usize; 3] = [8, 4, 2];
 
 /// One set of samples on the device.
 struct Layer {
@@ -100,7 +98,11 @@ impl ViewRun {
                 stream,
             })
         };
-        let sparse = if size[0].min(size[1]) < SMALL { CONTROL_SMALL } else { CONTROL };
+        let sparse = match size[0].min(size[1]) {
+            400.. => CONTROL[0],
+            200.. => CONTROL[1],
+            _ => CONTROL[2],
+        };
         let layers = [layer(sparse, 1, 2.0 * plan.step)?, layer(1, 0, plan.step)?];
         let parameters = device.upload(&scene.view().parameters(volume, scene.camera())?, 0)?;
         let view = Self::view(scene, volume);
