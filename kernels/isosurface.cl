@@ -53,7 +53,7 @@ static inline Stretch stretch_of(constant const View *view, VOLUME voxels, const
     return e;
 }
 
-// The colour of surface `surface` where the ray is at t, in its light.
+// What goes on the film of a surface met at t: `colour` in its light, or the distance from the eye.
 static inline Real3 surface_colour(constant const View *view, constant const Isosurface *params, VOLUME voxels, const Packet *p,
                                    const Bracket *b, Real t, Mask found, Real3 colour) {
     if (params->depth) {
