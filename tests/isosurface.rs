@@ -8,6 +8,8 @@ mod common;
 mod agreement;
 #[path = "isosurface/asked.rs"]
 mod asked;
+#[path = "isosurface/cameras.rs"]
+mod cameras;
 #[path = "isosurface/convergence.rs"]
 mod convergence;
 #[path = "isosurface/depth.rs"]
