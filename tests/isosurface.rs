@@ -26,6 +26,8 @@ mod occlusion;
 #[allow(dead_code, reason = "of another technique's reference, the camera and the box")]
 #[path = "emission_absorption/oracle.rs"]
 mod rays;
+#[path = "isosurface/skewed.rs"]
+mod skewed;
 #[path = "isosurface/thick.rs"]
 mod thick;
 #[allow(dead_code, reason = "only the files' headers and the random numbers are wanted here")]
