@@ -14,6 +14,8 @@ mod cameras;
 mod convergence;
 #[path = "isosurface/depth.rs"]
 mod depth;
+#[path = "isosurface/falling.rs"]
+mod falling;
 #[allow(dead_code, reason = "of another technique's reference, the grid and its interpolants")]
 #[path = "projection/grid.rs"]
 mod grid;
