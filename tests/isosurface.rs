@@ -32,6 +32,8 @@ mod rays;
 mod skewed;
 #[path = "isosurface/thick.rs"]
 mod thick;
+#[path = "isosurface/voids.rs"]
+mod voids;
 #[allow(dead_code, reason = "only the files' headers and the random numbers are wanted here")]
 #[path = "volumes/writers.rs"]
 mod writers;
