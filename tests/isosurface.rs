@@ -23,6 +23,8 @@ mod grid;
 mod layers;
 #[path = "isosurface/light.rs"]
 mod light;
+#[path = "isosurface/marschner_lobb.rs"]
+mod marschner_lobb;
 #[path = "isosurface/occlusion.rs"]
 mod occlusion;
 #[allow(dead_code, reason = "of another technique's reference, the camera and the box")]
