@@ -5,7 +5,6 @@ use cloudchamber::scene::Scene;
 use cloudchamber::technique::isosurface;
 use serde_json::{Value, json};
 
-use super::common::ct_head;
 use super::common::engine::House;
 
 #[test]
@@ -95,18 +94,6 @@ fn hardly_any_voxels_and_voxels_that_are_no_numbers_are_rendered_as_what_they_ar
     for look in &looks {
         assert_eq!(warned(&request(&hole, look), "non_finite_voxels"), (true, true), "{look}");
         assert_eq!(warned(&request(&none, &json!({"isovalue": 0.05})), "non_finite_voxels"), (true, false));
-    }
-}
-
-#[test]
-fn without_an_isovalue_one_is_chosen_and_said() {
-    let house = House::shared();
-    let reasons = |volume: Value| house.finish(&request(&volume, &json!({}))).resource()["plan"]["reasons"].to_string();
-    let smoke = reasons(json!({"builtin": "smoke", "resolution": 32}));
-    assert!(smoke.contains("isovalues: 0."), "{smoke}");
-    if let Some(ct) = ct_head() {
-        let said = reasons(house.file(ct));
-        assert!(said.contains("isovalues: "), "{said}");
     }
 }
 

@@ -9,8 +9,8 @@ use super::rays::{Eye, inside};
 
 pub const SIDE: usize = 24;
 const DIMS: [usize; 3] = [40, 37, 43];
-const VOXEL: f64 = 2.0 / 43.0;
-const ISOVALUE: f64 = 0.47;
+pub const VOXEL: f64 = 2.0 / 43.0;
+pub const ISOVALUE: f64 = 0.47;
 
 /// The distance from the eye that each pixel shows; `None` where there is nothing.
 pub fn depths(house: &House, volume: &Value, camera: &Value, parameters: &Value) -> Vec<Option<f64>> {
@@ -19,13 +19,18 @@ pub fn depths(house: &House, volume: &Value, camera: &Value, parameters: &Value)
         "budget": {"samples": 1}, "isosurface": parameters
     });
     request["isosurface"]["output"] = "depth".into();
-    let (film, _) = house.film(&request);
+    film_depths(house, &request)
+}
+
+/// The same of a whole request.
+pub fn film_depths(house: &House, request: &Value) -> Vec<Option<f64>> {
+    let (film, _) = house.film(request);
     assert!(film.main.mean.iter().all(|v| v.is_finite()));
     film.main.mean.chunks_exact(4).map(|p| (p[3] > 0.5).then(|| f64::from(p[0]))).collect()
 }
 
 /// Waves with a period of `period` voxels: smooth, and with much to meet.
-fn waves(period: f64) -> Grid {
+pub fn waves(period: f64) -> Grid {
     let k = std::f64::consts::TAU / (period * VOXEL);
     let value =
         |p: DVec3| 0.5 + 0.2 * (k * p.x).sin() * (0.9 * k * p.y + 0.4).cos() + 0.25 * (0.8 * k * p.z + p.x).sin();
@@ -35,14 +40,14 @@ fn waves(period: f64) -> Grid {
     Grid { dims: DIMS, voxels: (0..nx * ny * nz).map(|i| value(at(i)) as f32).collect() }
 }
 
-struct Crossing {
-    t: f64,
+pub struct Crossing {
+    pub t: f64,
     /// Change of the value over a voxel there.
-    slope: f64,
+    pub slope: f64,
 }
 
 /// Every crossing along a ray that a scan in 64ths of a voxel sees.
-fn crossings(f: impl Fn(f64) -> f64, near: f64, far: f64) -> Vec<Crossing> {
+pub fn crossings(f: impl Fn(f64) -> f64, near: f64, far: f64) -> Vec<Crossing> {
     let steps = ((far - near) / VOXEL * 64.0).ceil();
     let place = |i: f64| near + (far - near) * i / steps;
     let mut found = Vec::new();
@@ -64,7 +69,7 @@ fn crossings(f: impl Fn(f64) -> f64, near: f64, far: f64) -> Vec<Crossing> {
 
 /// Whether what was found is the first crossing, or a later one where all before come in pairs that are less than a step apart:
 /// between two samples those do not show. Nothing may be found only where there is no crossing left.
-fn check(found: Option<f64>, truth: &[Crossing], step: f64, case: &str) -> bool {
+pub fn check(found: Option<f64>, truth: &[Crossing], step: f64, case: &str) -> bool {
     // Single precision tells values 1e-7 apart: where a ray grazes the surface, that is far.
     let slack = |c: &Crossing| 1e-4 * VOXEL + 1e-6 + 2e-7 * VOXEL / c.slope;
     let is = |c: &Crossing| found.is_some_and(|t| (t - c.t).abs() <= slack(c));

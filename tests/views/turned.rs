@@ -8,7 +8,9 @@ use super::support::{Camera, grid, pixels, request};
 const SIDE: usize = 32;
 const DIMS: [usize; 3] = [20, 24, 28];
 const SPACING: f64 = 0.07;
-const TOLERANCE: f32 = 1e-4;
+const TOLERANCE: f32 = 1e-5;
+/// Where rounding may tip samples into the transfer function's next entry.
+const TOLERANCE_OF_TABLES: f32 = 1e-4;
 
 /// A quarter turn: exact, so that voxels go to voxels.
 fn quarter(axis: usize) -> DMat3 {
@@ -78,6 +80,7 @@ type Form = dyn Fn(&Look) -> Value;
 
 /// The film is the same after a turn of all, and another after a turn of the volume alone or the wrong way.
 fn check(technique: &str, form: &Form) {
+    let tolerance = if technique == "emission_absorption" { TOLERANCE_OF_TABLES } else { TOLERANCE };
     for look in looks() {
         let first = picture(technique, DMat3::IDENTITY, DMat3::IDENTITY, &look, form);
         assert!(
@@ -87,7 +90,7 @@ fn check(technique: &str, form: &Form) {
         for axis in 0..3 {
             let turn = quarter(axis);
             let off = apart(&first, &picture(technique, turn, turn, &look, form));
-            assert!(off < TOLERANCE, "{technique}, axis {axis}, {:?}: {off:e}", look.camera);
+            assert!(off < tolerance, "{technique}, axis {axis}, {:?}: {off:e}", look.camera);
             if !look.camera.perspective {
                 continue;
             }
