@@ -1,4 +1,4 @@
-// What follows is for packets whose lanes are all at least INNER_MARGIN voxels away from the box's faces: no clamps. A place is
+// Samples of packets whose lanes are all at least INNER_MARGIN voxels away from the box's faces: no clamps. A place is
 // given by inner_place, and values are in units of INNER_UNIT. Bytes are weighed along x in whole numbers, with weights of 15
 // bits: exact to 2^-15 of their difference, and the same to the last bit for any number of lanes.
 #define INNER_MARGIN 1.51f

@@ -86,11 +86,6 @@ static inline float least_lane(Real v) {
 
 static inline float greatest_lane(Real v) { return -least_lane(-v); }
 
-static inline int load_word(global const uchar *address) {
-    uchar4 bytes = vload4(0, address);
-    return as_int(bytes);
-}
-
 // gather_words(base, byte_offset): 32 bits from base + byte_offset, unaligned, a lane.
 // One AVX-512 or AVX2 instruction where clang has it; plain loads elsewhere. The buffer is padded by 8 bytes.
 #if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_gathersiv16si)
@@ -102,6 +97,10 @@ static inline Int gather_words(global const uchar *base, Int byte_offset) {
     return __builtin_ia32_gatherd_d256((Int)(0), (const int *)(size_t)base, byte_offset, (Int)(-1), 1);
 }
 #else
+static inline int load_word(global const uchar *address) {
+    uchar4 bytes = vload4(0, address);
+    return as_int(bytes);
+}
 #if LANES == 1
 static inline Int gather_words(global const uchar *base, Int byte_offset) { return load_word(base + byte_offset); }
 #else

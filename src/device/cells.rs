@@ -25,8 +25,6 @@ device_struct! {
     }
 }
 
-const TYPES: [VoxelType; 4] = [VoxelType::U8, VoxelType::I16, VoxelType::U16, VoxelType::F32];
-
 fn variant(kernel: &'static str, voxel: VoxelType) -> Variant {
     Variant { kernel, voxel: Some(voxel), features: &[] }
 }
@@ -39,15 +37,15 @@ fn source(kernel: &'static str, arguments: usize, variants: fn() -> Vec<Variant>
         arguments,
         volume: None,
         variants,
-        common: TYPES.len(),
+        common: VoxelType::ALL.len(),
     }
 }
 
 /// The kernels of the cells.
 pub fn sources() -> [Source; 2] {
     [
-        source("cells", 3, || TYPES.map(|t| variant("cells", t)).to_vec()),
-        source("distances", 5, || TYPES.map(|t| variant("distances", t)).to_vec()),
+        source("cells", 3, || VoxelType::ALL.map(|t| variant("cells", t)).to_vec()),
+        source("distances", 5, || VoxelType::ALL.map(|t| variant("distances", t)).to_vec()),
     ]
 }
 

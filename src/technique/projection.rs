@@ -183,8 +183,6 @@ static FEATURES: [Features; 8] = {
     ]
 };
 
-const TYPES: [VoxelType; 4] = [VoxelType::U8, VoxelType::I16, VoxelType::U16, VoxelType::F32];
-
 fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
     Variant { kernel: TECHNIQUE.name, voxel: Some(voxel), features }
 }
@@ -196,8 +194,8 @@ fn source() -> Source {
         structs: || DeviceView::opencl_text() + &Projection::opencl_text(),
         arguments: 7,
         volume: Some(2),
-        variants: || FEATURES.iter().flat_map(|f| TYPES.map(|t| variant(t, f))).collect(),
-        common: 2 * TYPES.len(),
+        variants: || FEATURES.iter().flat_map(|f| VoxelType::ALL.map(|t| variant(t, f))).collect(),
+        common: 2 * VoxelType::ALL.len(),
     }
 }
 

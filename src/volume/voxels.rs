@@ -17,6 +17,9 @@ pub enum VoxelType {
 }
 
 impl VoxelType {
+    /// Every type: kernels are built for each.
+    pub const ALL: [Self; 4] = [Self::U8, Self::I16, Self::U16, Self::F32];
+
     /// Bytes of one voxel.
     pub fn bytes(self) -> usize {
         match self {

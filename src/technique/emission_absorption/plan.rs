@@ -54,8 +54,6 @@ static FEATURES: [Features; 16] = {
     ]
 };
 const COMMON: usize = 2;
-const TYPES: [VoxelType; 4] = [VoxelType::U8, VoxelType::I16, VoxelType::U16, VoxelType::F32];
-
 fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
     Variant { kernel: TECHNIQUE.name, voxel: Some(voxel), features }
 }
@@ -67,8 +65,8 @@ pub(super) fn source() -> Source {
         structs: || DeviceView::opencl_text() + &EmissionAbsorption::opencl_text(),
         arguments: 7,
         volume: Some(2),
-        variants: || FEATURES.iter().flat_map(|f| TYPES.map(|t| variant(t, f))).collect(),
-        common: COMMON * TYPES.len(),
+        variants: || FEATURES.iter().flat_map(|f| VoxelType::ALL.map(|t| variant(t, f))).collect(),
+        common: COMMON * VoxelType::ALL.len(),
     }
 }
 

@@ -41,8 +41,6 @@ static FEATURES: [Features; 7] = {
     ]
 };
 
-const TYPES: [VoxelType; 4] = [VoxelType::U8, VoxelType::I16, VoxelType::U16, VoxelType::F32];
-
 fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
     Variant { kernel: TECHNIQUE.name, voxel: Some(voxel), features }
 }
@@ -66,8 +64,8 @@ pub(super) fn source() -> Source {
         structs: || DeviceView::opencl_text() + &Isosurface::opencl_text(),
         arguments: 7,
         volume: Some(2),
-        variants: || FEATURES.iter().flat_map(|f| TYPES.map(|t| variant(t, f))).collect(),
-        common: TYPES.len(),
+        variants: || FEATURES.iter().flat_map(|f| VoxelType::ALL.map(|t| variant(t, f))).collect(),
+        common: VoxelType::ALL.len(),
     }
 }
 
