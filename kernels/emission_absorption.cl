@@ -160,30 +160,21 @@ static inline void preintegrated_step(constant const View *view, constant const 
 #endif
 
 #if defined(NARROW) && !SHADED
-// The steps from k to end - 1 of lanes that are close together, as a pipeline: while a step's voxels are on their way, those of the
-// one before are permuted, the one before that is looked up and the one before that composited. One after the other, each would
-// wait for the last: the processor looks no further ahead than about a step.
+// The steps from k to end - 1 of lanes that are close together, at most STRIDE of them: first where each is in the table, then what
+// is there. Of two short loops the processor has several steps under way at once; of a long one it sees no further than about a step.
 static inline void narrow_steps(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
                                 global const uchar *table, const Packet *p, int k, int end, Radiance *r) {
-    #define BLOCK(step) block_at(view, voxels, convert_int4(p->low + p->low_pace * fmin(step, (float)(end - 1))))
-    #define PLACE(step) along(p->start, p->pace, (Real)(step))
-    float at = (float)k;
-    Block block = BLOCK(at);
-    Edges edges = block_edges(&block, PLACE(at));
-    block = BLOCK(at + 1.0f);
-    Entry entry = {(Int)(0), (Int)(0)}; // of no opacity
-    for (; k < end; k++, at += 1.0f) {
-        composite(params, optical(entry), r);
-        entry = entry_at(table, index_of(params, edges_raw(&edges), INNER_UNIT));
-        edges = block_edges(&block, PLACE(at + 1.0f));
-        block = BLOCK(at + 2.0f);
+    Int index[STRIDE];
+    for (int i = 0; i < end - k; i++) {
+        float at = (float)(k + i);
+        Real raw = narrow_raw(view, voxels, along(p->start, p->pace, (Real)(at)), convert_int4(p->low + p->low_pace * at));
+        index[i] = index_of(params, raw, INNER_UNIT);
     }
-    composite(params, optical(entry), r);
-    #undef BLOCK
-    #undef PLACE
+    for (int i = 0; i < end - k; i++) composite(params, optical(entry_at(table, index[i])), r);
 }
 #elif defined(NARROW)
-// The same of lit samples.
+// The same of lit samples, as a pipeline: while a step's voxels are on their way, those of the one before are interpolated, and the
+// one before that is lit and composited.
 static inline void narrow_steps(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
                                 global const uchar *table, const Packet *p, int k, int end, Radiance *r) {
     WideBlock block = wide_block_at(view, voxels, convert_int4(p->low + p->low_pace * (float)k));

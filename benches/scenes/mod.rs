@@ -32,7 +32,7 @@ pub fn synthetic(side: usize) -> Vec<u8> {
 
 /// What is measured: its name here and in `vtk_synth.py`, the technique, its parameters.
 pub fn modes() -> Vec<(&'static str, &'static str, Value)> {
-    // VTK's opacities are for four voxels; it ends a ray when 0.8 % gets through.
+    // VTK's opacities are for four voxels; it ends a ray when 0.8 % gets through and takes its samples without jitter.
     let unit = 4.0 * 2.0 / SIDE as f64;
     let point = |value: f64, color: [f64; 3], opacity: f64| json!({"value": value, "color": color, "opacity_per_unit": -(1.0 - opacity).ln() / unit});
     let points: Vec<Value> = (0..=50)
@@ -45,7 +45,7 @@ pub fn modes() -> Vec<(&'static str, &'static str, Value)> {
         })
         .collect();
     let light = json!({"ambient": 0.2, "diffuse": 0.7, "specular": 0.2, "shininess": 10});
-    let composite = json!({"transfer_function": {"points": points}, "opacity_threshold": 0.992});
+    let composite = json!({"transfer_function": {"points": points}, "opacity_threshold": 0.992, "jitter": false});
     let mut shaded = composite.clone();
     shaded["shading"] = true.into();
     shaded["light"] = light.clone();

@@ -26,27 +26,15 @@ static inline Block block_at(constant const View *view, VOLUME voxels, int4 firs
     return b;
 }
 
-// The values on the four edges of a cell along x, and what is left to weigh them by.
-typedef struct { Real a, b, c, d, fy, fz; } Edges;
-
-static inline Real edges_raw(const Edges *e) {
-    Real near = LERP(e->a, e->c, e->fz), far = LERP(e->b, e->d, e->fz);
-    return LERP(near, far, e->fy);
-}
-
-static inline Edges block_edges(const Block *block, Real3 p) {
+static inline Real block_raw(const Block *block, Real3 p) {
     Inner i = inner_at(p);
     Int at = (i.z << 2) + i.y - (block->first.z * 4 + block->first.y);
     Int order = __builtin_astype(BOTH(i.x), Int) + (PAIR_ORDER - block->first.x * 0x10001);
     #define LINE(n) to_real(MULTIPLY_ADD(SHUFFLE(__builtin_ia32_permvarsi512(block->rows, at + (n)), order), i.weights))
-    Edges e = {LINE(0), LINE(1), LINE(4), LINE(5), i.fy, i.fz};
+    Real a = LINE(0), b = LINE(1), c = LINE(4), d = LINE(5);
     #undef LINE
-    return e;
-}
-
-static inline Real block_raw(const Block *block, Real3 p) {
-    Edges e = block_edges(block, p);
-    return edges_raw(&e);
+    Real near = LERP(a, c, i.fz), far = LERP(b, d, i.fz);
+    return LERP(near, far, i.fy);
 }
 
 static inline Real narrow_raw(constant const View *view, VOLUME voxels, Real3 p, int4 first) {

@@ -166,17 +166,11 @@ static inline Real inverse_root(Real v) {
 static inline Real inverse_root(Real v) { return rsqrt(v); }
 #endif
 
-// x^y for x in (0, 1] and y >= 0, to 2e-6 max(1, y): polynomials, as a library's log2 and exp2 are calls that spill.
+// x^y for x in [0, 1] and y >= 0 by squares, which are a short chain; between whole numbers it is interpolated.
 static inline Real power(Real x, float y) {
-    Int bits = as_Int(x) - 0x3f3504f3; // the mantissa counted from sqrt(1/2)
-    Real m = as_Real((bits & 0x7fffff) + 0x3f3504f3) - 1.0f;
-    Real log = mad(m, mad(m, mad(m, mad(m, mad(m, mad(m, (Real)(0.17212873f), (Real)(-0.26950627f)), (Real)(0.2956336f)),
-        (Real)(-0.35935065f)), (Real)(0.48062915f)), (Real)(-0.72136404f)), (Real)(1.4426964f));
-    Real e = mad(m, log, to_real(bits >> 23)) * y;
-    e = select((Real)(-126.0f), e, MASK(e > -126.0f));
-    Int whole = to_int(e);
-    Real f = e - to_real(whole);
-    Real part = mad(f, mad(f, mad(f, mad(f, (Real)(0.0068419914f), (Real)(0.053226834f)), (Real)(0.23943921f)), (Real)(0.69305067f)),
-        (Real)(0.99999809f));
-    return as_Real(as_Int(part) + (whole << 23));
+    int whole = (int)y;
+    Real result = mad((Real)(y - floor(y)), x - 1.0f, (Real)(1.0f));
+    for (; whole > 0; whole >>= 1, x *= x)
+        if (whole & 1) result *= x;
+    return result;
 }

@@ -28,7 +28,7 @@ static inline Real3 shade(constant const View *view, Real3 n, const Real3 half_w
         Real facing = fabs(mad(n.x, d[0], mad(n.y, d[1], n.z * d[2]))) * scale;
         Real along_half = fmin(fabs(dot3(n, half_way[i])) * scale, (Real)(1.0f));
         Real lambert = view->diffuse * select(facing, (Real)(1.0f), flat);
-        Real glint = view->specular * power(fmax(along_half, (Real)(1e-6f)), view->shininess);
+        Real glint = view->specular * power(along_half, view->shininess);
         glint = select(glint, (Real)(0.0f), flat);
         body = real3(mad(lambert, c[0], body.x), mad(lambert, c[1], body.y), mad(lambert, c[2], body.z));
         shine = real3(mad(glint, c[0], shine.x), mad(glint, c[1], shine.y), mad(glint, c[2], shine.z));

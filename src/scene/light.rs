@@ -29,7 +29,7 @@ pub struct LightRequest {
     #[serde(default = "default_specular")]
     #[schemars(range(min = 0, max = 1))]
     specular: f64,
-    /// Exponent of the highlight.
+    /// Exponent of the highlight; between whole numbers the highlight is interpolated.
     #[serde(default = "default_shininess")]
     #[schemars(range(min = 1, max = 1000))]
     shininess: f64,

@@ -16,6 +16,7 @@
 //! | `cuda_sample` | | the CUDA sample `volumeRender`'s parameters, instead | |
 //! | `opacity_scale` | | 0–10⁴ | 1 |
 //! | `step_voxels` | smallest voxel side | 0.05–16 | 1 |
+//! | `jitter` | | samples at random places within their steps | true |
 //! | `opacity_threshold` | opacity | 0.5–1 | 0.999 |
 //! | `interpolation` | | `nearest`, `trilinear`, `b_spline`, `catmull_rom` | `trilinear`; `nearest` for labels |
 //! | `pre_integrated` | | second order in the step | false |
@@ -137,6 +138,10 @@ pub struct Parameters {
     #[serde(default = "one")]
     #[schemars(range(min = 0, max = 10_000))]
     opacity_scale: f64,
+    /// Whether every pixel and pass takes its samples at a random place within its steps, so that banding becomes noise that
+    /// averages out. Without, they are taken in the middle: less noise in one pass, but bands that no number of passes removes.
+    #[serde(default = "yes")]
+    jitter: bool,
     /// Step along the ray, in sides of the smallest voxel.
     #[serde(default = "one")]
     #[schemars(range(min = 0.05, max = 16))]

@@ -17,8 +17,12 @@ fn the_stated_error_is_the_real_one() {
     let house = House::shared();
     for volume in [house.file(mri_head()), json!({"builtin": "smoke", "resolution": 64})] {
         let (truth, _) = house.film(&request(&volume, 256, 0.25, 99));
-        for (samples, step) in [(2, 1.0), (16, 1.0), (64, 1.0), (64, 4.0)] {
-            let (film, error) = house.film(&request(&volume, samples, step, 1));
+        for (samples, step, jitter) in
+            [(2, 1.0, true), (16, 1.0, true), (64, 1.0, true), (64, 4.0, true), (64, 4.0, false)]
+        {
+            let mut request = request(&volume, samples, step, 1);
+            request["emission_absorption"]["jitter"] = jitter.into();
+            let (film, error) = house.film(&request);
             let real = truth.difference(&film).unwrap();
             let ratio = error.total / real;
             // Never much too small. It may be too large: the discretisation is a bound that holds for a first-order method, a
@@ -26,7 +30,7 @@ fn the_stated_error_is_the_real_one() {
             let most = if step > 1.0 { 8.0 } else { 4.0 };
             assert!(
                 (0.7..most).contains(&ratio),
-                "{volume}, {samples} samples, step {step}: says {}, is {real}",
+                "{volume}, {samples} samples, step {step}, jitter {jitter}: says {}, is {real}",
                 error.total
             );
         }

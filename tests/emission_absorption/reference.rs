@@ -99,6 +99,36 @@ fn the_plain_form_is_of_first_order_and_the_pre_integrated_one_of_second() {
 }
 
 #[test]
+fn without_jitter_samples_lie_in_the_middle_of_their_steps() {
+    // Along z through the middle of the box every step is whole: the picture is the sum over midpoints, in double precision.
+    let house = House::shared();
+    let volume = house.floats([64, 64, 64], |_, _, z| 0.5 + 0.4 * (3.0 * z).sin());
+    let film = |seed: u64, jitter: bool| {
+        house.film(&json!({"technique": "emission_absorption", "volume": volume, "image": {"width": 16, "height": 16},
+            "budget": {"samples": 1}, "seed": seed,
+            "camera": {"eye": [0, 0, 3], "up": [0, 1, 0], "projection": "orthographic", "fov_y_deg": 20},
+            "emission_absorption": {"jitter": jitter, "step_voxels": 4, "opacity_threshold": 1, "transfer_function": {"points": [
+                {"value": 0, "color": [1, 1, 1], "opacity_per_unit": 0}, {"value": 1, "color": [1, 1, 1], "opacity_per_unit": 1}]}}}))
+            .0
+    };
+    let value = |z: f64| {
+        let at = ((z + 1.0) * 32.0 - 0.5).clamp(0.0, 63.0);
+        let voxel = |i: f64| 0.5 + 0.4 * (3.0 * ((i + 0.5) / 32.0 - 1.0)).sin();
+        voxel(at.floor()) + (voxel((at.floor() + 1.0).min(63.0)) - voxel(at.floor())) * at.fract()
+    };
+    // The box is seen from t = 2 to 4, which are ends of steps of 1/8.
+    let depth: f64 = (0..16).map(|k| value(1.0 - (f64::from(k) + 0.5) / 8.0) / 8.0).sum();
+    let truth = 1.0 - (-depth).exp();
+    let (still, again) = (film(1, false), film(2, false));
+    assert_eq!(still.main.mean, again.main.mean, "another seed moves samples that are not jittered");
+    for p in still.main.mean.chunks_exact(4) {
+        assert!((f64::from(p[3]) - truth).abs() < 1e-4, "{} for {truth}", p[3]);
+    }
+    let moved = film(1, true).main.mean.chunks_exact(4).map(|p| (f64::from(p[3]) - truth).abs()).fold(0.0, f64::max);
+    assert!(moved > 1e-3, "jitter changes no more than {moved:e}");
+}
+
+#[test]
 fn pre_integration_misses_no_spike() {
     // A value that rises through a spike a hundredth of a step wide: its integral is what it should be, whatever the step.
     let house = House::shared();

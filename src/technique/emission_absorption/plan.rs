@@ -167,6 +167,9 @@ impl View for Parameters {
     }
 
     fn look(&self, camera: &Camera, view: &mut DeviceView) {
+        if !self.jitter {
+            (view.jittered, view.place) = (0, 0.5);
+        }
         self.light.clone().unwrap_or_default().apply(camera, view);
     }
 }
