@@ -1,171 +1,305 @@
-// Photons through a grid of extinction: free paths by optical depth, exact from voxel to voxel, isotropic scattering,
-// absorption by weight, Russian roulette for weights that no longer matter (it keeps the mean, an energy cut-off does not).
-//   -ln(u) = integral of sigma ds  (Amanatides & Woo, Eurographics 1987, for the voxels)
+// Photons through participating media: free paths by optical depth, -ln(u) = integral of sigma ds; absorption by weight; scattering
+// by the medium's phase function; refraction and reflection where the index changes; Russian roulette for weights that no longer
+// matter (it keeps the mean, an energy cut-off does not).
 // One work-item carries a packet of photons; a lane whose photon has ended takes the next of its own share.
-// Sums are 64-bit integers in units of 2^-30, so that they do not depend on the order of addition.
 
-#define FIXED_ONE 1073741824.0f
-
-#define LEDGER_EXIT 0
+#define LEDGER_EXIT 0 // -x, +x, -y, +y, -z, +z
 #define LEDGER_ABSORBED 6
 #define LEDGER_LOST 7
-#define LEDGER_SCATTERINGS 8
-#define LEDGER_FAULTS 9
-#define LEDGER_PATH 10
+#define LEDGER_SPECULAR 8
+#define LEDGER_GATED 9
+#define LEDGER_UNSCATTERED 10 // -z, +z
+#define LEDGER_SCATTERINGS 12 // a count, like the next three
+#define LEDGER_FAULTS 13
+#define LEDGER_BROKEN 14
+#define LEDGER_MISSED 15
+#define LEDGER_PATH 16 // in units of params->path_unit_mm
+#define LEDGER_BINS 17 // -z by radius and angle, then +z
 
-// A photon that takes more steps than this through voxels has met a fault of arithmetic and is counted as lost.
-#define MOST_STEPS 100000
+// A photon that takes more steps than this has met a fault of arithmetic, or never ends; it is counted as lost.
+#define MOST_STEPS 1000000
 
-static inline void tally(global ulong *sums, Int cell, Real amount, Mask active) {
-    IntLanes to, on;
-    RealLanes value;
-    to.v = cell, on.v = active, value.v = amount;
-    for (int i = 0; i < LANES; i++)
-        if (on.lane[i]) atom_add(&sums[to.lane[i]], (ulong)convert_long_rte(value.lane[i] * FIXED_ONE));
+typedef struct { ULong absorbed, lost, specular; UInt scatterings; Real path; } Gains;
+
+// Adds a collision's deposit to the grid.
+static inline void deposit(constant const PhotonTransport *params, global ulong *grid, Int voxel, Real3 p, Real amount, Mask hit) {
+    // Layers and boundaries that have no end reach further than the grid.
+    if (params->endless) {
+        hit &= MASK(p.x >= 0.0f) & MASK(p.x <= params->size_mm[0]) & MASK(p.y >= 0.0f) & MASK(p.y <= params->size_mm[1]);
+        hit &= MASK(p.z >= 0.0f) & MASK(p.z <= params->size_mm[2]);
+    }
+    tally(grid, voxel, amount, hit);
 }
 
-typedef struct {
-    Real3 p, d;            // grid units; grid units per unit of length
-    Int x, y, z;           // the voxel
-    Real weight, depth;    // what is left of the photon, and of its free path in optical depth
-    UInt number;           // photon number within the item's lane
-    UInt event;            // numbers the random numbers of this photon
-} Photon;
+#if !VOXEL_WALLS
+// Shares a straight flight out among the voxels that it crosses: weight times length, times the absorption for absorbed energy.
+static inline void deposit_track(constant const PhotonTransport *params, global const float *table, global ulong *grid, Real3 p, Real3 d,
+                                 Real length, Real weight, Mask on) {
+    Real t = (Real)(0.0f);
+    // Voxels' planes by their number, so that no plane is met twice.
+    Int x = to_int(floor(p.x * params->voxels_per_mm[0])), y = to_int(floor(p.y * params->voxels_per_mm[1])), z = to_int(floor(p.z * params->voxels_per_mm[2]));
+    Int up_x = -MASK(d.x > 0.0f), up_y = -MASK(d.y > 0.0f), up_z = -MASK(d.z > 0.0f);
+    for (int i = 0; i < MOST_STEPS && any_lane(on); i++) {
+        Real tx = (to_real(x + up_x) * params->voxel_mm[0] - p.x) / d.x, ty = (to_real(y + up_y) * params->voxel_mm[1] - p.y) / d.y;
+        Real tz = (to_real(z + up_z) * params->voxel_mm[2] - p.z) / d.z;
+        tx = select(tx, (Real)(1e30f), MASK(fabs(d.x) < 1e-12f)), ty = select(ty, (Real)(1e30f), MASK(fabs(d.y) < 1e-12f));
+        tz = select(tz, (Real)(1e30f), MASK(fabs(d.z) < 1e-12f));
+        Real to = fmin(fmin(tx, ty), fmin(tz, length)), part = fmax(to - t, (Real)(0.0f));
+        Mask inside = on & MASK(x >= 0) & MASK(x < params->grid[0]) & MASK(y >= 0) & MASK(y < params->grid[1]) & MASK(z >= 0) & MASK(z < params->grid[2]);
+        if (any_lane(inside)) {
+            Real amount = weight * part * params->deposit_scale;
+            Real3 middle = along(p, d, t + 0.5f * part);
+            Int voxel = (z * params->grid[1] + y) * params->grid[0] + x;
+            if (params->tally == TALLY_ABSORBED_TRACK) {
+                Cell c = cell_at(params, table, middle);
+                Int medium = medium_of(params, table, c, middle);
+                amount *= extinction_at(params, table, medium, c, middle) * (1.0f - medium_number(table, medium, 1));
+            }
+            tally(grid, voxel, amount, inside);
+        }
+        Mask in_x = on & MASK(tx <= to), in_y = on & MASK(ty <= to), in_z = on & MASK(tz <= to);
+        x += select((Int)(0), up_x + up_x - 1, in_x), y += select((Int)(0), up_y + up_y - 1, in_y), z += select((Int)(0), up_z + up_z - 1, in_z);
+        t = select(t, to, on);
+        on &= MASK(to < length);
+    }
+}
+#endif
 
-static inline UInt4Lanes draw(constant const FieldPass *pass, const Photon *photon, UInt lane_first) {
-    UInt low = pass->first[0] + lane_first + photon->number;
-    UInt high = pass->first[1] + as_UInt(select((Int)(0), (Int)(1), MASK(low < pass->first[0])));
-    UInt4Lanes ctr = {low, high, photon->event, (UInt)(0x70686f74u)};
-    return philox(ctr, pass->seed[0], pass->seed[1]);
+// Counts what leaves the box by a face, by its radius from the beam's axis and its angle to the face.
+static inline void leave(constant const PhotonTransport *params, global const float *table, global ulong *ledger, const Photon *photon,
+                         int axis, Mask up, Mask gone) {
+    tally(ledger, select((Int)(LEDGER_EXIT + 2 * axis), (Int)(LEDGER_EXIT + 2 * axis + 1), up), photon->weight, gone);
+    if (axis != 2) return;
+    Int side = select((Int)(0), (Int)(1), up);
+    tally(ledger, LEDGER_UNSCATTERED + side, photon->weight, gone & MASK(photon->scatterings == 0));
+    if (params->radius_bins == 0) return;
+    Real dx = photon->p.x - params->beam_mm[0], dy = photon->p.y - params->beam_mm[1], radius = sqrt(mad(dx, dx, dy * dy)), cosine = fabs(photon->d.z);
+    Int ring = (Int)(-1), cone = (Int)(-1);
+    for (int i = 0; i <= params->radius_bins; i++) ring -= MASK(radius >= table[params->at_radii + i]);
+    for (int i = 0; i <= params->angle_bins; i++) cone -= MASK(cosine <= table[params->at_cosines + i]);
+    Mask binned = gone & MASK(ring >= 0) & MASK(ring < params->radius_bins) & MASK(cone >= 0) & MASK(cone < params->angle_bins);
+    tally(ledger, LEDGER_BINS + (side * params->radius_bins + ring) * params->angle_bins + cone, photon->weight, binned);
 }
 
-static inline Real3 isotropic(Real u, Real v, float cos_from) {
-    Real cos_theta = mad(u, (Real)(1.0f - cos_from), (Real)(cos_from));
-    Real sin_theta = sqrt(fmax((Real)(0.0f), 1.0f - cos_theta * cos_theta)), phi = 6.28318530717958648f * v;
-    return real3(sin_theta * cos(phi), sin_theta * sin(phi), cos_theta);
+// Takes photons over a wall across one axis, or back from it; returns those that left the box.
+static inline Mask cross_wall(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table, global ulong *ledger,
+                              UInt lane_first, int axis, Real wall, Mask in, Photon *photon) {
+    Real d = axis == 0 ? photon->d.x : axis == 1 ? photon->d.y : photon->d.z;
+    Int here = axis == 0 ? photon->cell.x : axis == 1 ? photon->cell.y : photon->cell.z;
+    Mask up = MASK(d > 0.0f), back = (Mask)(0);
+    Int next = here + select((Int)(-1), (Int)(1), up);
+    Mask out = in & (MASK(next < 0) | MASK(next >= params->walls[axis]));
+    Real place = wall;
+    if (params->boundary[axis] == BOUNDARY_MIRROR) back = out;
+    if (params->boundary[axis] == BOUNDARY_CYCLIC) {
+        next = select(next, select((Int)(params->walls[axis] - 1), (Int)(0), up), out);
+        place = select(place, select((Real)(params->high_mm[axis]), (Real)(params->low_mm[axis]), up), out);
+    }
+    if (params->boundary[axis] != BOUNDARY_ABSORBING) out = (Mask)(0);
+    if (axis == 0) photon->p.x = select(photon->p.x, place, in);
+    if (axis == 1) photon->p.y = select(photon->p.y, place, in);
+    if (axis == 2) photon->p.z = select(photon->p.z, place, in);
+    if ((params->fresnel && any_lane(out)) || params->mismatch) {
+        Cell ahead = photon->cell;
+        Int inside = clamp(next, (Int)(0), (Int)(params->walls[axis] - 1));
+        if (axis == 0) ahead.x = inside;
+        if (axis == 1) ahead.y = inside;
+        if (axis == 2) ahead.z = inside;
+        Real before = medium_number(table, medium_of(params, table, photon->cell, photon->p), 2);
+        Real after = select(medium_number(table, medium_of(params, table, ahead, photon->p), 2), (Real)(params->outside_index), out);
+        Mask bends = in & ~back & MASK(before != after) & (params->fresnel ? (Mask)(-1) : ~out);
+        if (any_lane(bends)) {
+            Real eta = before / after, cos_out, reflected = fresnel(fabs(d), eta, &cos_out);
+            Mask returns = bends & MASK(unit_open(draw(pass, photon, lane_first, 2).a) < reflected);
+            photon->event += as_UInt(select((Int)(0), (Int)(1), bends));
+            Mask through = bends & ~returns;
+            Real3 bent = scale3(photon->d, eta);
+            if (axis == 0) bent.x = copysign(cos_out, d);
+            if (axis == 1) bent.y = copysign(cos_out, d);
+            if (axis == 2) bent.z = copysign(cos_out, d);
+            photon->d = select3(photon->d, scale3(bent, rsqrt(fmax(dot3(bent, bent), (Real)(1e-20f)))), through);
+            back |= returns;
+        }
+    }
+    if (axis == 0) photon->d.x = select(photon->d.x, -photon->d.x, back);
+    if (axis == 1) photon->d.y = select(photon->d.y, -photon->d.y, back);
+    if (axis == 2) photon->d.z = select(photon->d.z, -photon->d.z, back);
+    Mask gone = out & ~back, moves = in & ~back & ~gone;
+    if (any_lane(gone)) leave(params, table, ledger, photon, axis, up, gone);
+    if (axis == 0) photon->cell.x = select(photon->cell.x, next, moves);
+    if (axis == 1) photon->cell.y = select(photon->cell.y, next, moves);
+    if (axis == 2) photon->cell.z = select(photon->cell.z, next, moves);
+    return gone;
 }
 
-// From a frame whose z is `axis` (unit length) to the grid's: Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 6(1), 2017.
-static inline Real3 turn_to(constant const float *axis, Real3 v) {
-    float s = copysign(1.0f, axis[2]), a = -1.0f / (s + axis[2]), b = axis[0] * axis[1] * a;
-    return real3(v.x * (1.0f + s * axis[0] * axis[0] * a) + v.y * b + v.z * axis[0],
-                 v.x * (s * b) + v.y * (s + axis[1] * axis[1] * a) + v.z * axis[1],
-                 v.x * (-s * axis[0]) + v.y * (-axis[1]) + v.z * axis[2]);
-}
-
-static inline Real3 per_length(constant const PhotonTransport *params, Real3 d) {
-    return real3(d.x * params->cells_per_mm[0], d.y * params->cells_per_mm[1], d.z * params->cells_per_mm[2]);
-}
-
-// Puts new photons at the source in the lanes of `fresh`.
-static inline void emit(constant const FieldPass *pass, constant const PhotonTransport *params, UInt lane_first, Mask fresh, Photon *photon) {
-    photon->event = select(photon->event, (UInt)(0u), as_UInt(fresh));
-    UInt4Lanes r = draw(pass, photon, lane_first);
-    Real3 d = turn_to(params->source_axis, isotropic(unit_open(r.a), unit_open(r.b), params->source_cos_from));
-    constant const float *at = params->source;
-    photon->p = select3(photon->p, real3(at[0], at[1], at[2]), fresh);
-    photon->d = select3(photon->d, per_length(params, d), fresh);
-    photon->x = select(photon->x, (Int)(clamp((int)at[0], 0, params->grid[0] - 1)), fresh);
-    photon->y = select(photon->y, (Int)(clamp((int)at[1], 0, params->grid[1] - 1)), fresh);
-    photon->z = select(photon->z, (Int)(clamp((int)at[2], 0, params->grid[2] - 1)), fresh);
-    photon->weight = select(photon->weight, (Real)(1.0f), fresh);
-    photon->depth = select(photon->depth, -log(unit_open(r.c)), fresh);
-    photon->event += as_UInt(select((Int)(0), (Int)(1), fresh));
-}
-
-// Distance to the wall of voxel `cell` ahead, along one axis.
-static inline Real wall(Real p, Real d, Int cell) {
-    Real to = to_real(select(cell, cell + 1, MASK(d > 0.0f)));
-    return select(fmax((to - p) / d, (Real)(0.0f)), (Real)(1e30f), MASK(fabs(d) < 1e-12f));
-}
-
-// Scatters, absorbs and plays roulette in the lanes of `hit`; returns the lanes that go on.
-static inline Mask collide(constant const FieldPass *pass, constant const PhotonTransport *params, UInt lane_first, Real sigma, Int cell,
-                           Mask hit, global ulong *grid, global ulong *ledger, Photon *photon) {
-    UInt4Lanes r = draw(pass, photon, lane_first);
-    Real absorbed = photon->weight * (1.0f - params->albedo);
-    if (params->tally == TALLY_ABSORBED) tally(grid, cell, absorbed, hit);
-    if (params->tally == TALLY_FLUENCE_COLLISION) tally(grid, cell, photon->weight * params->cells_per_mm[0] / sigma, hit);
-    tally(ledger, (Int)(LEDGER_ABSORBED), absorbed, hit);
-    Real left = photon->weight - absorbed;
-    Mask faint = MASK(left < params->roulette_threshold) & hit;
-    Mask survives = MASK(unit_open(r.d) < params->roulette_survival);
-    Real gained = select((Real)(0.0f), left / params->roulette_survival, survives);
-    tally(ledger, (Int)(LEDGER_LOST), left - gained, faint);
-    left = select(left, gained, faint);
-    Mask goes_on = hit & (~faint | survives) & MASK(left > 0.0f);
-    photon->weight = select(photon->weight, left, hit);
-    photon->d = select3(photon->d, per_length(params, isotropic(unit_open(r.a), unit_open(r.b), -1.0f)), goes_on);
-    photon->depth = select(photon->depth, -log(unit_open(r.c)), goes_on);
+// Collisions in the lanes of `hit`: tells the real ones, deposits, plays the roulette, scatters. Returns the photons that go on.
+static inline Mask collide(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table, global ulong *grid,
+                           global ulong *ledger, UInt lane_first, Real rate, Int medium, Mask hit, Photon *photon, Gains *gains) {
+    UInt4Lanes r = draw(pass, photon, lane_first, 0);
     photon->event += as_UInt(select((Int)(0), (Int)(1), hit));
-    return goes_on;
+    photon->depth = select(photon->depth, -log(unit_open(r.c)), hit);
+    Mask real = hit;
+    Medium m = medium_all(table, medium);
+    Real sigma = rate;
+#if BLOCK_WALLS
+    sigma = extinction_at(params, table, medium, photon->cell, photon->p);
+    Mask broken = hit & MASK(sigma > rate * 1.000001f);
+    if (any_lane(broken)) tally_fixed(ledger, (Int)(LEDGER_BROKEN), (ULong)(1), broken);
+#if TRACKING == DELTA
+    real = hit & MASK(unit_open(r.d) * rate < sigma);
+#else
+    Real null = rate - sigma, chance = sigma / (sigma + fabs(null));
+    real = hit & MASK(unit_open(r.d) < chance);
+    Real factor = select(null / (rate * (1.0f - chance)), sigma / (rate * chance), real);
+    photon->weight = select(photon->weight, photon->weight * factor, hit);
+#endif
+    if (!any_lane(real)) return hit;
+#endif
+    Real absorbed = photon->weight * (1.0f - m.albedo);
+    if (params->tally != TALLY_FLUENCE_TRACK && params->tally != TALLY_ABSORBED_TRACK) {
+        Int voxel = VOXEL_WALLS ? cell_voxel(params, photon->cell) : voxel_at(params, photon->p);
+        Real amount = absorbed;
+        if (params->tally == TALLY_FLUENCE) amount = photon->weight * params->deposit_scale / sigma;
+        if (params->tally == TALLY_GATHER) {
+            Real3 to = real3(params->eye_mm[0] - photon->p.x, params->eye_mm[1] - photon->p.y, params->eye_mm[2] - photon->p.z);
+            Real mu = dot3(photon->d, to) * rsqrt(fmax(dot3(to, to), (Real)(1e-20f)));
+            amount = photon->weight * params->deposit_scale / sigma * phase_density(table, &m, clamp(mu, (Real)(-1.0f), (Real)(1.0f)));
+        }
+        deposit(params, grid, voxel, photon->p, amount, real);
+    }
+    gain(&gains->absorbed, absorbed, real);
+    gains->scatterings += as_UInt(select((Int)(0), (Int)(1), real));
+    Real left = photon->weight - absorbed;
+    Mask faint = MASK(fabs(left) < params->roulette_threshold) & real;
+    if (any_lane(faint)) {
+        Mask survives = MASK(unit_open(draw(pass, photon, lane_first, 3).a) < params->roulette_survival);
+        Real gained = select((Real)(0.0f), left / params->roulette_survival, survives);
+        gain(&gains->lost, left - gained, faint);
+        left = select(left, gained, faint);
+    }
+    photon->weight = select(photon->weight, left, real);
+    Mask goes_on = real & MASK(left != 0.0f);
+    Real one_minus, one_plus;
+    sample_phase(table, &m, unit_open(r.a), &one_minus, &one_plus);
+    photon->d = select3(photon->d, turned(photon->d, one_minus, one_plus, unit_open(r.b)), goes_on);
+    photon->scatterings += select((Int)(0), (Int)(1), goes_on);
+    return goes_on | (hit & ~real);
 }
 
-kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport *params, global const float *extinction_per_mm,
-                             global ulong *grid, global ulong *ledger) {
+kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport *params, global const float *table, global ulong *grid,
+                             global ulong *ledger) {
     uint item = (uint)get_global_id(0);
     if ((ulong)item * (LANES * pass->per_lane) >= pass->count) return;
     UInt lane_first = item * (LANES * pass->per_lane) + as_UInt((Int)(LANE_IDS)) * pass->per_lane;
-    int nx = params->grid[0], ny = params->grid[1], nz = params->grid[2];
 
     Photon photon;
     photon.p = photon.d = real3(0.0f, 0.0f, 0.0f);
-    photon.x = photon.y = photon.z = (Int)(0);
-    photon.weight = photon.depth = (Real)(0.0f);
+    photon.cell.x = photon.cell.y = photon.cell.z = photon.scatterings = (Int)(0);
+    photon.weight = photon.depth = photon.optical = (Real)(0.0f);
     photon.number = photon.event = (UInt)(0u);
+    Gains gains;
+    gains.absorbed = gains.lost = gains.specular = (ULong)(0);
+    gains.scatterings = (UInt)(0u);
+    gains.path = (Real)(0.0f);
     // The last item of a launch may have fewer photons than lanes: never one too many.
     Int share = as_Int(min((UInt)(pass->count) - min(lane_first, (UInt)(pass->count)), (UInt)(pass->per_lane)));
     Int left = share, steps = (Int)(0);
     Mask alive = (Mask)(0);
-    UInt scatterings = (UInt)(0u);
-    Real path = (Real)(0.0f);
 
     for (;;) {
         Mask fresh = ~alive & MASK(left > 0);
         if (any_lane(fresh)) {
-            photon.number = as_UInt(select(as_Int(photon.number), share - left, fresh));
-            emit(pass, params, lane_first, fresh, &photon);
+            Photon launched = photon;
+            launched.number = as_UInt(share - left);
+            launched.event = (UInt)(0u);
+            launch(pass, params, lane_first, &launched);
+            launched.event = (UInt)(1u), launched.weight = (Real)(1.0f), launched.optical = (Real)(0.0f), launched.scatterings = (Int)(0);
+            Mask missed;
+            enter(params, table, fresh, &launched, &gains.specular, &missed);
+            photon.p = select3(photon.p, launched.p, fresh), photon.d = select3(photon.d, launched.d, fresh);
+            photon.cell.x = select(photon.cell.x, launched.cell.x, fresh), photon.cell.y = select(photon.cell.y, launched.cell.y, fresh);
+            photon.cell.z = select(photon.cell.z, launched.cell.z, fresh);
+            photon.weight = select(photon.weight, launched.weight, fresh), photon.depth = select(photon.depth, launched.depth, fresh);
+            photon.optical = select(photon.optical, launched.optical, fresh);
+            photon.number = as_UInt(select(as_Int(photon.number), as_Int(launched.number), fresh));
+            photon.event = as_UInt(select(as_Int(photon.event), as_Int(launched.event), fresh));
+            photon.scatterings = select(photon.scatterings, (Int)(0), fresh);
+            if (any_lane(missed)) {
+                gain(&gains.lost, photon.weight, missed);
+                tally_fixed(ledger, (Int)(LEDGER_MISSED), (ULong)(1), missed);
+            }
             left -= select((Int)(0), (Int)(1), fresh);
             steps = select(steps, (Int)(0), fresh);
-            alive |= fresh;
+            alive |= fresh & ~missed & MASK(photon.weight > 0.0f);
         }
-        if (!any_lane(alive)) break;
+        if (!any_lane(alive)) {
+            if (!any_lane(MASK(left > 0))) break;
+            continue;
+        }
 
-        Int cell = (photon.z * ny + photon.y) * nx + photon.x;
-        Real sigma = gather_reals(extinction_per_mm, select((Int)(0), cell, alive));
-        Real tx = wall(photon.p.x, photon.d.x, photon.x), ty = wall(photon.p.y, photon.d.y, photon.y), tz = wall(photon.p.z, photon.d.z, photon.z);
+        Int medium = medium_of(params, table, photon.cell, photon.p);
+        Real rate = collision_rate(params, table, medium, photon.cell, photon.p);
+        Real wx = wall_ahead(params, table, 0, photon.cell.x, MASK(photon.d.x > 0.0f)), wy = wall_ahead(params, table, 1, photon.cell.y, MASK(photon.d.y > 0.0f));
+        Real wz = wall_ahead(params, table, 2, photon.cell.z, MASK(photon.d.z > 0.0f));
+        Real tx = distance_to(wx, photon.p.x, photon.d.x), ty = distance_to(wy, photon.p.y, photon.d.y), tz = distance_to(wz, photon.p.z, photon.d.z);
         Real t_wall = fmin(tx, fmin(ty, tz));
-        Mask hit = MASK(photon.depth < sigma * t_wall) & alive;
-        Real t = select(t_wall, photon.depth / sigma, hit);
-        photon.p = select3(photon.p, along(photon.p, photon.d, t), alive);
-        path += select((Real)(0.0f), t, alive);
-        if (params->tally == TALLY_FLUENCE_TRACK) tally(grid, cell, photon.weight * t * params->cells_per_mm[0], alive);
-
-        Mask crosses = alive & ~hit;
-        photon.depth = select(photon.depth, fmax(photon.depth - sigma * t_wall, (Real)(0.0f)), crosses);
-        Mask in_x = crosses & MASK(tx == t_wall), in_y = crosses & ~in_x & MASK(ty == t_wall), in_z = crosses & ~in_x & ~in_y;
-        Int up_x = select((Int)(-1), (Int)(1), MASK(photon.d.x > 0.0f)), up_y = select((Int)(-1), (Int)(1), MASK(photon.d.y > 0.0f)), up_z = select((Int)(-1), (Int)(1), MASK(photon.d.z > 0.0f));
-        photon.x += in_x & up_x, photon.y += in_y & up_y, photon.z += in_z & up_z;
-        Mask out_x = in_x & (MASK(photon.x < 0) | MASK(photon.x >= nx)), out_y = in_y & (MASK(photon.y < 0) | MASK(photon.y >= ny)), out_z = in_z & (MASK(photon.z < 0) | MASK(photon.z >= nz));
-        Mask out = out_x | out_y | out_z;
-        if (any_lane(out)) {
-            Int face = select(select((Int)(4), (Int)(2), out_y), (Int)(0), out_x);
-            Int up = select(select(up_z, up_y, out_y), up_x, out_x);
-            tally(ledger, LEDGER_EXIT + face + select((Int)(0), (Int)(1), MASK(up > 0)), photon.weight, out);
+#if TRACKING == MARCH
+        // The lecture's march: a free path is as many whole steps as it takes to use up its optical depth.
+        Real t = fmin(t_wall, (Real)(params->march_step_mm));
+        Mask at_wall = MASK(t_wall <= params->march_step_mm), hit = alive & ~at_wall & MASK(photon.depth <= rate * t);
+#else
+        Mask hit = MASK(photon.depth < rate * t_wall) & alive, at_wall = ~hit;
+        Real t = select(t_wall, photon.depth / rate, hit);
+#endif
+        Mask late = (Mask)(0);
+        if (params->gate_mm < 1e30f) {
+            Real index = medium_number(table, medium, 2), room = fmax((params->gate_mm - photon.optical) / index, (Real)(0.0f));
+            late = alive & MASK(t > room);
+            t = fmin(t, room);
+            photon.optical = mad(index, t, photon.optical);
+            hit &= ~late;
         }
+        if (params->tally == TALLY_FLUENCE_TRACK || params->tally == TALLY_ABSORBED_TRACK) {
+#if VOXEL_WALLS
+            Real amount = photon.weight * t * params->deposit_scale;
+            if (params->tally == TALLY_ABSORBED_TRACK) amount *= rate * (1.0f - medium_number(table, medium, 1));
+            tally(grid, cell_voxel(params, photon.cell), amount, alive);
+#else
+            deposit_track(params, table, grid, photon.p, photon.d, t, photon.weight, alive);
+#endif
+        }
+        photon.p = select3(photon.p, along(photon.p, photon.d, t), alive);
+        gains.path += select((Real)(0.0f), t * params->paths_per_mm, alive);
+        photon.depth = select(photon.depth, fmax(mad(-rate, t, photon.depth), (Real)(0.0f)), alive & ~hit);
+
+        Mask crosses = alive & ~hit & ~late & at_wall, gone = late;
+        if (any_lane(crosses)) {
+            Mask in_x = crosses & MASK(tx == t_wall), in_y = crosses & ~in_x & MASK(ty == t_wall), in_z = crosses & ~in_x & ~in_y;
+            if (any_lane(in_x)) gone |= cross_wall(pass, params, table, ledger, lane_first, 0, wx, in_x, &photon);
+            if (any_lane(in_y)) gone |= cross_wall(pass, params, table, ledger, lane_first, 1, wy, in_y, &photon);
+            if (any_lane(in_z)) gone |= cross_wall(pass, params, table, ledger, lane_first, 2, wz, in_z, &photon);
+        }
+        if (any_lane(late)) tally(ledger, (Int)(LEDGER_GATED), photon.weight, late);
         Mask goes_on = hit;
         if (any_lane(hit)) {
-            goes_on = collide(pass, params, lane_first, sigma, cell, hit, grid, ledger, &photon);
-            scatterings += as_UInt(select((Int)(0), (Int)(1), hit));
+#if TRACKING == MARCH || BLOCK_WALLS
+            // The medium is that of the place which the photon has come to.
+            medium = medium_of(params, table, photon.cell, photon.p);
+#endif
+            goes_on = collide(pass, params, table, grid, ledger, lane_first, rate, medium, hit, &photon, &gains);
         }
         steps += 1;
-        Mask fault = alive & (MASK(steps > MOST_STEPS) | MASK(!(photon.weight <= 1e30f)));
+        alive &= ~gone & (goes_on | ~hit);
+        Mask fault = alive & (MASK(steps > MOST_STEPS) | MASK(!(fabs(photon.weight) <= 1e30f)));
         if (any_lane(fault)) {
-            tally(ledger, (Int)(LEDGER_LOST), select((Real)(0.0f), photon.weight, MASK(photon.weight <= 1e30f)), fault & ~out & (goes_on | crosses));
-            tally(ledger, (Int)(LEDGER_FAULTS), (Real)(1.0f), fault);
+            gain(&gains.lost, select((Real)(0.0f), photon.weight, MASK(fabs(photon.weight) <= 1e30f)), fault);
+            tally_fixed(ledger, (Int)(LEDGER_FAULTS), (ULong)(1), fault);
+            alive &= ~fault;
         }
-        alive = ((crosses & ~out) | goes_on) & ~fault;
     }
-    tally(ledger, (Int)(LEDGER_SCATTERINGS), to_real(scatterings), (Mask)(-1));
-    tally(ledger, (Int)(LEDGER_PATH), path, (Mask)(-1));
+    tally_fixed(ledger, (Int)(LEDGER_ABSORBED), gains.absorbed, (Mask)(-1));
+    tally_fixed(ledger, (Int)(LEDGER_LOST), gains.lost, (Mask)(-1));
+    tally_fixed(ledger, (Int)(LEDGER_SPECULAR), gains.specular, (Mask)(-1));
+    tally_fixed(ledger, (Int)(LEDGER_SCATTERINGS), to_ulong(gains.scatterings), (Mask)(-1));
+    tally_fixed(ledger, (Int)(LEDGER_PATH), as_ULong(to_long(rint(gains.path))), (Mask)(-1));
 }

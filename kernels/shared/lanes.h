@@ -34,8 +34,10 @@ typedef struct { Real x, y, z; } Real3;
 #define to_int(v) JOIN(convert_int, LANES_SUFFIX)(v)
 #define to_uint(v) JOIN(convert_uint, LANES_SUFFIX)(v)
 #define to_ulong(v) JOIN(convert_ulong, LANES_SUFFIX)(v)
+#define to_long(v) JOIN(convert_long, LANES_SUFFIX)(v)
 #define as_Int(v) JOIN(as_int, LANES_SUFFIX)(v)
 #define as_UInt(v) JOIN(as_uint, LANES_SUFFIX)(v)
+#define as_ULong(v) JOIN(as_ulong, LANES_SUFFIX)(v)
 #define as_Real(v) JOIN(as_float, LANES_SUFFIX)(v)
 
 // A tile of pixels is a packet: neighbours diverge least.
@@ -64,6 +66,7 @@ static inline int any_lane(Mask m) { return any(m); }
 // The address of a lane's element when a vector has to be taken apart (scatter, atomics).
 typedef union { Real v; float lane[LANES]; } RealLanes;
 typedef union { Int v; int lane[LANES]; } IntLanes;
+typedef union { ULong v; ulong lane[LANES]; } ULongLanes;
 
 #if LANES == 1
 static inline float least_lane(Real v) { return v; }

@@ -257,7 +257,7 @@ fn subject(request: Option<&VolumeRequest>, store: &Store, limits: &Limits) -> R
         .and_then(|t| if let technique::Kind::Field(parse) = t.kind { Some((t, parse)) } else { None });
     let (technique, parse) =
         found.ok_or_else(|| Error::internal("the schema permits a field that is not in the list"))?;
-    let field = parse(&within_limits(technique, parameters, limits), &format!("/volume/{name}"))?;
+    let field = parse(&within_limits(technique, parameters, limits), &format!("/volume/{name}"), store)?;
     let framing = field.framing();
     Ok((Subject::Field(field), framing))
 }

@@ -14,7 +14,7 @@ use crate::device::program::{Source, Variant};
 use crate::device::structs::View as DeviceView;
 use crate::error::Result;
 use crate::scene::camera::{Camera, Framing};
-use crate::volume::Volume;
+use crate::volume::{Store, Volume};
 
 /// Every technique. Adding one is one line.
 pub const ALL: &[Technique] = &[
@@ -77,8 +77,8 @@ pub struct Technique {
 pub enum Kind {
     /// Turns a camera into an image.
     View(fn(&Value, &str) -> Result<Arc<dyn View>>),
-    /// Fills a grid.
-    Field(fn(&Value, &str) -> Result<Arc<dyn Field>>),
+    /// Fills a grid; its parameters may name volumes of the store.
+    Field(fn(&Value, &str, &Store) -> Result<Arc<dyn Field>>),
 }
 
 impl Technique {

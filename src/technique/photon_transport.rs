@@ -1,28 +1,46 @@
 //! # `photon_transport`
 //!
-//! Photons from a light through a participating medium, as the lecture simulates them in its `chamber`: a free path ends
-//! where its optical depth reaches −ln u, a collision absorbs the fraction 1 − albedo of the weight and scatters the rest
-//! isotropically, and Russian roulette ends photons that no longer matter without changing any mean (an energy cut-off
-//! would lose what it cuts). Voxels are traversed exactly, so there is no step to choose.
+//! Photons through participating media: a free path ends where its optical depth reaches −ln u, a collision absorbs the part
+//! 1 − albedo of the weight and scatters the rest by the medium's phase function, an interface reflects by Fresnel's formulae or
+//! refracts, and Russian roulette ends photons that no longer matter without changing any mean (an energy cut-off would lose what
+//! it cuts). Without media it is the lecture's `chamber`.
 //!
-//! The grid is the fluence per launched photon, Φ = Σ w s / ΔV (track length) or Σ w / (σ ΔV) (collision), per mm², or the
-//! energy absorbed per mm³. Deposits are 64-bit integers and random numbers are keyed by photon and event, so the same
-//! request gives the same bytes on any number of threads.
+//! The grid is, per launched photon, the fluence Φ = Σ w s / ΔV (track length) or Σ w / (σ ΔV) (collision) per mm², the energy
+//! absorbed per mm³, or the lecture's gather L = (1/σ) Σ w P(ω, ω_eye) / ΔV per mm² and steradian: each event is scored towards the
+//! eye as it happens, which costs a phase function a collision, and another eye is another simulation. Deposits are 64-bit integers
+//! and random numbers are keyed by photon and event, so the same request gives the same bytes on any number of threads.
 //!
 //! | parameter | unit | range | default |
 //! |---|---|---|---|
 //! | `photons` | | 1–limit | 10⁶ |
-//! | `grid` | voxels | 4–512 | 64, 64, 64 |
-//! | `size_mm` | mm | 10⁻³–10⁶ | 1, 1, 1 |
-//! | `albedo` | | 0–1 | 0.9 |
-//! | `extinction_scale` | | 0–1000 | 1 |
-//! | `source` | mm from the box's corner | a point, `isotropic` or a `cone` | above the hole in the lid |
-//! | `tally` | | `fluence`, `absorbed` | `fluence` |
-//! | `estimator` | | `track_length`, `collision` | `track_length` |
+//! | `size_mm` | mm | 10⁻³–10⁶ | 60, 60, 60; the volume's; the chamber's 1, 1, 1 |
+//! | `grid` | voxels | 1–512 | 60, 60, 60; the volume's; the chamber's 64, 64, 64 |
+//! | `medium` | | absorption, scattering, index, phase | |
+//! | `media` with `labels` | | a medium per label of a volume | |
+//! | `layers` | | media along z | |
+//! | `density` | | extinction times a volume, with `medium` | |
+//! | `source` | mm from the box's corner | `pencil`, `isotropic`, `planar`, `disk`, `cone`, `diffuse` | a pencil along +z |
+//! | `boundary` | | `absorbing`, `cyclic`, `mirror`; Fresnel | absorbing; layers go on for ever in x and y |
+//! | `time_gate_ns` | ns | | none |
+//! | `tracking` | | `auto`, `exact`, `march`, `delta`, `weighted` | `auto` |
+//! | `march_step_mm` | mm | | a tenth of the shortest mean free path |
+//! | `majorant` | | `local` or `global`, times a scale | local, 1 |
+//! | `tally` | | `fluence`, `absorbed`, `radiance_gather` | `fluence` |
+//! | `estimator` | | `track_length`, `collision` | what the scene permits |
+//! | `eye_mm` | mm from the box's corner | for the gather | before the entry face |
+//! | `exit_histogram` | mm, degrees | edges of radius and angle | |
 //! | `roulette` | | threshold 0–1, survival 0–1 | 10⁻⁴, 0.1 |
+//! | `albedo`, `extinction_scale` | | of the chamber | 0.9, 1 |
 //! | `seed` | | | 0 |
 //!
 //! Example: see [`example`], which a test runs.
+
+mod geometry;
+mod medium;
+mod plan;
+mod report;
+mod source;
+mod tracking;
 
 use std::sync::Arc;
 
@@ -38,12 +56,17 @@ use crate::device_struct;
 use crate::error::{Error, Result};
 use crate::request;
 use crate::scene::camera::Framing;
-use crate::volume::{NewVolume, Volume, Voxels, builtin};
+use crate::volume::{NewVolume, Store, Volume, Voxels};
+use geometry::{Geometry, GridRequest, Layer};
+use medium::Medium;
+use report::Ledgers;
+use source::LightSource;
+use tracking::Tracking;
 
 /// The technique's line in the list.
 pub const TECHNIQUE: Technique = Technique {
     name: "photon_transport",
-    summary: "Photons from a light through the lecture's chamber: free paths, isotropic scattering, fluence per voxel",
+    summary: "Photons through media: free paths, scattering, refraction; fluence or absorbed energy per voxel, and where the rest went",
     schema: request::schema_of::<Parameters>,
     example,
     source,
@@ -65,26 +88,84 @@ device_struct! {
 }
 
 device_struct! {
-    /// The kernel's own parameters.
+    /// The kernel's own parameters. Lengths are in mm from the box's corner; `at_` says where in the table something starts.
     pub struct PhotonTransport {
         /// Voxels along x, y, z.
         pub grid: [i32; 3],
+        /// Their sides.
+        pub voxel_mm: [f32; 3],
         /// Voxels per mm along x, y, z.
-        pub cells_per_mm: [f32; 3],
-        /// The source, in voxels from the corner.
+        pub voxels_per_mm: [f32; 3],
+        /// Size of the grid.
+        pub size_mm: [f32; 3],
+        /// Where the media start.
+        pub low_mm: [f32; 3],
+        /// Where they end.
+        pub high_mm: [f32; 3],
+        /// Whether they go further than the grid.
+        pub endless: i32,
+        /// What is at their ends: 0 nothing (absorbing), 1 the other side (cyclic), 2 a mirror.
+        pub boundary: [i32; 3],
+        /// Cells between walls, along each axis.
+        pub walls: [i32; 3],
+        /// From wall to wall.
+        pub wall_mm: [f32; 3],
+        /// Walls per mm; 0 where there is but one cell.
+        pub walls_per_mm: [f32; 3],
+        /// Layers.
+        pub layers: i32,
+        /// Ends of the layers, from 0 on.
+        pub at_layers: i32,
+        /// Labels or densities of the voxels.
+        pub at_voxels: i32,
+        /// Majorants of the blocks.
+        pub at_blocks: i32,
+        /// Edges of the histogram's radii.
+        pub at_radii: i32,
+        /// Cosines of the edges of its angles.
+        pub at_cosines: i32,
+        /// Bins by radius.
+        pub radius_bins: i32,
+        /// Bins by angle.
+        pub angle_bins: i32,
+        /// The axis that radii count from.
+        pub beam_mm: [f32; 2],
+        /// Refractive index outside.
+        pub outside_index: f32,
+        /// Whether the outer faces reflect and refract.
+        pub fresnel: i32,
+        /// Whether what they reflect of the beam is lost.
+        pub specular_entry: i32,
+        /// Whether refractive indices differ inside.
+        pub mismatch: i32,
+        /// Optical path after which a photon is taken out.
+        pub gate_mm: f32,
+        /// The march's step.
+        pub march_step_mm: f32,
+        /// The source's number.
+        pub source_type: i32,
+        /// Where it is.
         pub source: [f32; 3],
-        /// The axis of the source's cone, unit length.
+        /// Where it shines, unit length.
         pub source_axis: [f32; 3],
+        /// Its edges, or the axes of its disk times its radius.
+        pub source_u: [f32; 3],
+        /// See `source_u`.
+        pub source_v: [f32; 3],
         /// Cosine of the cone's half angle; -1 for all directions.
         pub source_cos_from: f32,
-        /// The part of the weight that a collision scatters.
-        pub albedo: f32,
         /// Weights below this meet the roulette.
         pub roulette_threshold: f32,
         /// Probability to survive it.
         pub roulette_survival: f32,
         /// What is added up: see the `TALLY_` names.
         pub tally: i32,
+        /// Deposits of length are times this.
+        pub deposit_scale: f32,
+        /// Paths are counted times this.
+        pub paths_per_mm: f32,
+        /// What the gather looks from.
+        pub eye_mm: [f32; 3],
     }
 }
 
@@ -92,11 +173,8 @@ device_struct! {
 const FIXED_ONE: f64 = 1_073_741_824.0;
 /// Photons that a lane takes one after the other, at most: enough that lanes which end early are refilled.
 const PHOTONS_PER_LANE: u32 = 32;
-/// Entries of the kernel's ledger, in its order.
-const LEDGER: usize = 11;
-/// Names of the ledger's fractions, in the kernel's order.
-const FRACTIONS: [&str; 8] =
-    ["exit_minus_x", "exit_plus_x", "exit_minus_y", "exit_plus_y", "exit_minus_z", "exit_plus_z", "absorbed", "lost"];
+/// Entries of the kernel's ledger before the histogram.
+const LEDGER_BINS: usize = 17;
 
 /// The parameters in a request.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -105,26 +183,58 @@ pub struct Parameters {
     /// Photons to launch.
     #[schemars(range(min = 1, max = 1_000_000_000))]
     photons: u64,
-    /// Voxels of the grid along x, y, z.
-    #[schemars(inner(range(min = 4, max = 512)))]
-    grid: [u32; 3],
-    /// Size of the chamber along x, y, z. Its densities are per mm.
+    /// Voxels of the grid along x, y, z. Default: 60 each; the volume's; the chamber's 64.
+    #[schemars(inner(range(min = 1, max = 512)))]
+    grid: Option<[u32; 3]>,
+    /// Size of the box along x, y, z. Default: 60 mm each; the volume's; the chamber's 1 mm. Layers bring their own thickness.
     #[schemars(inner(range(min = 1e-3, max = 1e6)))]
-    size_mm: [f64; 3],
-    /// The part of a collision's weight that scatters; the rest is absorbed.
+    size_mm: Option<[f64; 3]>,
+    /// The medium of the whole box, or what `density` multiplies.
+    medium: Option<Medium>,
+    /// A medium per label.
+    #[schemars(length(min = 1, max = 1024))]
+    media: Option<Vec<Medium>>,
+    /// A volume of whole numbers: which of `media` each voxel is.
+    labels: Option<GridRequest>,
+    /// Layers along z from the entry face on.
+    #[schemars(length(min = 1, max = 64))]
+    layers: Option<Vec<Layer>>,
+    /// A volume: the extinction is its voxel times that of `medium`.
+    density: Option<GridRequest>,
+    /// Of the chamber: the part of a collision's weight that scatters. Default 0.9.
     #[schemars(range(min = 0, max = 1))]
-    albedo: f64,
-    /// Multiplies every density.
+    albedo: Option<f64>,
+    /// Of the chamber: multiplies every density. Default 1.
     #[schemars(range(min = 0, max = 1000))]
-    extinction_scale: f64,
+    extinction_scale: Option<f64>,
     /// The light.
     source: LightSource,
-    /// What each voxel holds: `fluence` (per mm²) or energy `absorbed` (per mm³), per launched photon.
-    #[schemars(extend("enum" = ["fluence", "absorbed"]))]
+    /// What is at the box's faces.
+    boundary: Boundary,
+    /// Photons are taken out after this time in the medium.
+    #[schemars(range(min = 1e-6, max = 1e6))]
+    time_gate_ns: Option<f64>,
+    /// How free paths are found: `exact` from wall to wall, the lecture's `march`, `delta` tracking by majorants, `weighted` tracking
+    /// where those may be too small, or the cheapest that is unbiased.
+    #[schemars(extend("enum" = ["auto", "exact", "march", "delta", "weighted"]))]
+    tracking: String,
+    /// The march's step. Default: a tenth of the shortest mean free path.
+    #[schemars(range(min = 1e-6, max = 1e6))]
+    march_step_mm: Option<f64>,
+    /// What delta and weighted tracking go by.
+    majorant: Majorant,
+    /// What each voxel holds, per launched photon: `fluence` (per mm²), energy `absorbed` (per mm³), or the `radiance_gather` towards
+    /// the eye (per mm² and steradian).
+    #[schemars(extend("enum" = ["fluence", "absorbed", "radiance_gather"]))]
     tally: String,
-    /// How the fluence is added up: `track_length` (less noise in thin air) or `collision` (less work).
-    #[schemars(extend("enum" = ["track_length", "collision"]))]
-    estimator: String,
+    /// How it is added up: `collision` (less work) or `track_length` (less noise where collisions are rare). Default: `track_length`
+    /// where something lets photons pass freely and for densities, else `collision`.
+    #[schemars(extend("enum" = ["track_length", "collision", null]))]
+    estimator: Option<String>,
+    /// Where the gather looks from. Default: before the entry face.
+    eye_mm: Option<[f64; 3]>,
+    /// Bins for what leaves through the faces at the ends of z.
+    exit_histogram: Option<ExitHistogram>,
     /// Ends faint photons without bias.
     roulette: Roulette,
     /// Keys every random number of the simulation.
@@ -132,21 +242,51 @@ pub struct Parameters {
     seed: u64,
 }
 
-/// The light.
+/// What is at the box's faces.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-struct LightSource {
-    /// `isotropic`, or a `cone` about `direction`.
-    #[serde(rename = "type")]
-    #[schemars(extend("enum" = ["isotropic", "cone"]))]
-    kind: String,
-    /// Where it stands, from the box's corner; null is above the hole in the lid.
-    position_mm: Option<[f64; 3]>,
-    /// Where a cone points.
-    direction: [f64; 3],
-    /// Half the cone's opening.
-    #[schemars(range(min = 0.01, max = 180))]
-    half_angle_deg: f64,
+struct Boundary {
+    /// At both ends of x: `absorbing` lets photons out, `cyclic` brings them back on the other side, `mirror` reflects. Layers
+    /// default to going on for ever.
+    #[schemars(extend("enum" = ["absorbing", "cyclic", "mirror", null]))]
+    x: Option<String>,
+    /// At both ends of y.
+    #[schemars(extend("enum" = ["absorbing", "cyclic", "mirror", null]))]
+    y: Option<String>,
+    /// At both ends of z.
+    #[schemars(extend("enum" = ["absorbing", "cyclic", "mirror", null]))]
+    z: Option<String>,
+    /// Whether absorbing faces reflect and refract where the index outside is another.
+    fresnel: bool,
+    /// Refractive index outside.
+    #[schemars(range(min = 1, max = 4))]
+    outside_index: f64,
+    /// With `fresnel`: whether the entry face reflects a part of the beam, which is `specular` in the ledger.
+    specular_entry: bool,
+}
+
+/// What delta and weighted tracking go by.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+struct Majorant {
+    /// One for the whole box (`global`), or one for each block of 8³ voxels (`local`).
+    #[schemars(extend("enum" = ["local", "global"]))]
+    grid: String,
+    /// Times the greatest extinction. Below 1 delta tracking is biased, and says so.
+    #[schemars(range(min = 1e-3, max = 1e3))]
+    scale: f64,
+}
+
+/// Bins for what leaves through the faces at the ends of z.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct ExitHistogram {
+    /// Edges of the radius from the source's axis, rising.
+    #[schemars(length(min = 2, max = 257), inner(range(min = 0, max = 1e6)))]
+    radius_edges_mm: Vec<f64>,
+    /// Edges of the angle to the face's normal, rising.
+    #[schemars(length(min = 2, max = 181), inner(range(min = 0, max = 90)))]
+    angle_edges_deg: Vec<f64>,
 }
 
 /// Russian roulette (Arvo & Kirk, SIGGRAPH 1990).
@@ -165,22 +305,40 @@ impl Default for Parameters {
     fn default() -> Self {
         Self {
             photons: 1_000_000,
-            grid: [64; 3],
-            size_mm: [1.0; 3],
-            albedo: 0.9,
-            extinction_scale: 1.0,
+            grid: None,
+            size_mm: None,
+            medium: None,
+            media: None,
+            labels: None,
+            layers: None,
+            density: None,
+            albedo: None,
+            extinction_scale: None,
             source: LightSource::default(),
+            boundary: Boundary::default(),
+            time_gate_ns: None,
+            tracking: "auto".into(),
+            march_step_mm: None,
+            majorant: Majorant::default(),
             tally: "fluence".into(),
-            estimator: "track_length".into(),
+            estimator: None,
+            eye_mm: None,
+            exit_histogram: None,
             roulette: Roulette::default(),
             seed: 0,
         }
     }
 }
 
-impl Default for LightSource {
+impl Default for Boundary {
     fn default() -> Self {
-        Self { kind: "isotropic".into(), position_mm: None, direction: [0.0, -1.0, 0.0], half_angle_deg: 20.0 }
+        Self { x: None, y: None, z: None, fresnel: false, outside_index: 1.0, specular_entry: true }
+    }
+}
+
+impl Default for Majorant {
+    fn default() -> Self {
+        Self { grid: "local".into(), scale: 1.0 }
     }
 }
 
@@ -203,131 +361,117 @@ pub fn example() -> Value {
 fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
-        headers: &["shared/lanes.h", "shared/rng.h"],
+        headers: &[
+            "shared/lanes.h",
+            "shared/rng.h",
+            "shared/phase.h",
+            "shared/fresnel.h",
+            "shared/medium.h",
+            "shared/tally.h",
+            "shared/photon.h",
+        ],
         structs: || {
             "#pragma OPENCL EXTENSION cl_khr_int64_base_atomics : enable\n\
-             #define TALLY_ABSORBED 0\n#define TALLY_FLUENCE_COLLISION 1\n#define TALLY_FLUENCE_TRACK 2\n"
+             #define TALLY_ABSORBED 0\n#define TALLY_FLUENCE 1\n#define TALLY_FLUENCE_TRACK 2\n#define TALLY_GATHER 3\n\
+             #define TALLY_ABSORBED_TRACK 4\n\
+             #define BOUNDARY_ABSORBING 0\n#define BOUNDARY_CYCLIC 1\n#define BOUNDARY_MIRROR 2\n"
                 .to_owned()
                 + &FieldPass::opencl_text()
                 + &PhotonTransport::opencl_text()
         },
         arguments: 5,
         volume: None,
-        variants: || vec![VARIANT],
-        common: usize::MAX,
+        variants: || {
+            plan::FEATURES.iter().map(|f| Variant { kernel: TECHNIQUE.name, voxel: None, features: f }).collect()
+        },
+        common: 2,
     }
 }
 
-const VARIANT: Variant = Variant { kernel: TECHNIQUE.name, voxel: None, features: &[] };
+/// A simulation: the request with everything resolved.
+struct Simulation {
+    parameters: Parameters,
+    geometry: Geometry,
+    source: source::Source,
+    tracking: Tracking,
+    tracking_reason: String,
+    /// Whether deposits are by track length.
+    track: bool,
+    reasons: Vec<String>,
+}
 
-fn parse(parameters: &Value, at: &str) -> Result<Arc<dyn Field>> {
+fn parse(parameters: &Value, at: &str, store: &Store) -> Result<Arc<dyn Field>> {
     let p: Parameters = request::parse(parameters, &(TECHNIQUE.schema)(), at)?;
-    for (axis, (place, size)) in p.position_mm().into_iter().zip(p.size_mm).enumerate() {
-        if !(0.0..=size).contains(&place) {
-            let permitted = format!("0 to {size} (size_mm)");
-            return Err(Error::invalid(format!("{at}/source/position_mm/{axis}"), "outside the box", permitted));
-        }
-    }
-    if DVec3::from(p.source.direction).try_normalize().is_none() {
-        return Err(Error::invalid(
-            format!("{at}/source/direction"),
-            "the direction is zero",
-            "a direction of any length",
-        ));
-    }
-    Ok(Arc::new(p))
-}
-
-impl Parameters {
-    fn dims(&self) -> [usize; 3] {
-        self.grid.map(|n| n as usize)
-    }
-
-    fn spacing_mm(&self) -> [f64; 3] {
-        std::array::from_fn(|a| self.size_mm[a] / f64::from(self.grid[a]))
-    }
-
-    /// The point light stands above the middle of the lid's hole unless told otherwise.
-    fn position_mm(&self) -> [f64; 3] {
-        self.source.position_mm.unwrap_or_else(|| std::array::from_fn(|a| [0.5, 0.9, 0.5][a] * self.size_mm[a]))
-    }
-
-    fn world_from_index(&self) -> DAffine3 {
-        let spacing = DVec3::from(self.spacing_mm());
-        DAffine3 { matrix3: DMat3::from_diagonal(spacing), translation: -0.5 * DVec3::from(self.size_mm) }
-    }
-
-    /// The extinction of every voxel, from the chamber at its centre.
-    fn extinction_per_mm(&self) -> Vec<f32> {
-        let [nx, ny, nz] = self.dims();
-        let centre = |i: usize, n: usize| (i as f64 + 0.5) / n as f64;
-        let mut table = Vec::with_capacity(nx * ny * nz);
-        for z in 0..nz {
-            for y in 0..ny {
-                table.extend((0..nx).map(|x| {
-                    (builtin::chamber_value(centre(x, nx), centre(y, ny), centre(z, nz)) * self.extinction_scale) as f32
-                }));
+    let geometry = Geometry::new(&p, store, at)?;
+    let source = p.source.resolve(geometry.size_mm, geometry.chamber, &format!("{at}/source"))?;
+    let (tracking, tracking_reason) = tracking::choose(&p, &geometry, at)?;
+    if let Some(histogram) = &p.exit_histogram {
+        for (name, edges) in
+            [("radius_edges_mm", &histogram.radius_edges_mm), ("angle_edges_deg", &histogram.angle_edges_deg)]
+        {
+            if !edges.windows(2).all(|w| w[0] < w[1]) {
+                return Err(Error::invalid(
+                    format!("{at}/exit_histogram/{name}"),
+                    "the edges do not rise",
+                    "rising numbers",
+                ));
             }
         }
-        table
     }
-
-    fn tally_code(&self) -> i32 {
-        match (self.tally.as_str(), self.estimator.as_str()) {
-            ("absorbed", _) => 0,
-            (_, "collision") => 1,
-            _ => 2,
-        }
+    let [least, greatest] = geometry.extinction_range_per_mm();
+    let ends = [&p.boundary.x, &p.boundary.y, &p.boundary.z];
+    if greatest == 0.0
+        && p.time_gate_ns.is_none()
+        && ends.iter().all(|b| b.as_deref().is_some_and(|b| b != "absorbing"))
+    {
+        let permitted = "absorbing somewhere, or a time_gate_ns";
+        return Err(Error::invalid(
+            format!("{at}/boundary"),
+            "in a box without media no photon would ever end",
+            permitted,
+        ));
     }
+    let free = least == 0.0 || matches!(geometry.place, geometry::Where::Density(_));
+    let (track, why) = match p.estimator.as_deref() {
+        Some(asked) => (asked == "track_length", "as asked"),
+        None if p.tally == "fluence" && free => (true, "collisions are rare or missing somewhere"),
+        None => (false, "photons collide everywhere"),
+    };
+    if p.tally == "radiance_gather" && track {
+        let permitted = "collision, or leave it out";
+        return Err(Error::invalid(format!("{at}/estimator"), "the gather scores collisions", permitted));
+    }
+    let estimator = if track { "track_length" } else { "collision" };
+    let reasons = vec![
+        format!("photon_transport: tracking {tracking_reason}"),
+        format!("photon_transport: estimator {estimator}: {why}"),
+        "photon_transport: roulette in place of an energy cut-off".into(),
+    ];
+    Ok(Arc::new(Simulation { parameters: p, geometry, source, tracking, tracking_reason, track, reasons }))
 }
 
-impl Field for Parameters {
+impl Field for Simulation {
     fn framing(&self) -> Framing {
-        Framing::new(&self.world_from_index(), self.dims(), false)
+        let spacing = DVec3::from(self.spacing_mm());
+        let translation = -0.5 * DVec3::from(self.geometry.size_mm);
+        let world_from_index = DAffine3 { matrix3: DMat3::from_diagonal(spacing), translation };
+        Framing::new(&world_from_index, self.geometry.dims, false)
     }
 
     fn seed(&self) -> u64 {
-        self.seed
+        self.parameters.seed
     }
 
     fn plan(&self) -> Result<FieldPlan> {
-        let cells_per_mm = self.spacing_mm().map(|s| (1.0 / s) as f32);
-        let position = self.position_mm();
-        let half_angle = if self.source.kind == "cone" { self.source.half_angle_deg } else { 180.0 };
-        let parameters = PhotonTransport {
-            grid: self.grid.map(|n| n as i32),
-            cells_per_mm,
-            source: std::array::from_fn(|a| (position[a] / self.size_mm[a] * f64::from(self.grid[a])) as f32),
-            source_axis: DVec3::from(self.source.direction).normalize().as_vec3().to_array(),
-            source_cos_from: half_angle.to_radians().cos() as f32,
-            albedo: self.albedo as f32,
-            roulette_threshold: self.roulette.threshold as f32,
-            roulette_survival: self.roulette.survival as f32,
-            tally: self.tally_code(),
-        };
-        Ok(FieldPlan {
-            variant: VARIANT,
-            parameters: bytemuck::bytes_of(&parameters).to_vec(),
-            table: self.extinction_per_mm(),
-            cells: self.dims().iter().product(),
-            ledger: LEDGER,
-            histories: self.photons,
-            histories_per_lane: PHOTONS_PER_LANE,
-            reasons: vec![
-                "photon_transport: free paths by exact voxel traversal, unbiased for any density, no step and no majorant".into(),
-                "photon_transport: scattering is isotropic; roulette in place of an energy cut-off".into(),
-            ],
-        })
+        Ok(self.device_plan())
     }
 
     fn finish(&self, grid: &[u64], ledgers: &[Vec<u64>], histories: u64) -> Result<FieldResult> {
         let [sx, sy, sz] = self.spacing_mm();
-        // Deposits of path are in voxel sides along x: back to mm. Then per photon and per volume of a voxel.
-        let per_deposit = if self.tally_code() == 0 { 1.0 } else { sx };
-        let scale = per_deposit / (FIXED_ONE * histories as f64 * sx * sy * sz);
+        let scale = 1.0 / (self.deposit_scale() * FIXED_ONE * histories as f64 * sx * sy * sz);
         let values = grid.iter().map(|&sum| (sum as i64 as f64 * scale) as f32).collect();
         let volume = Volume::new(NewVolume {
-            dims: self.dims(),
+            dims: self.geometry.dims,
             spacing: self.spacing_mm(),
             linear: None,
             voxels: Voxels::F32(values),
@@ -339,32 +483,6 @@ impl Field for Parameters {
             unit: "mm".into(),
             notes: Vec::new(),
         })?;
-        Ok(FieldResult { volume, result: self.report(ledgers, histories) })
-    }
-}
-
-impl Parameters {
-    /// The ledger as fractions of the launched weight, each with the standard error of its batches.
-    fn report(&self, ledgers: &[Vec<u64>], histories: u64) -> Value {
-        let total = |entry: usize| ledgers.iter().map(|l| l[entry] as i64 as f64).sum::<f64>() / FIXED_ONE;
-        let batches = ledgers.len() as f64;
-        let per_batch = histories as f64 / batches;
-        let mut fractions = serde_json::Map::new();
-        for (entry, name) in FRACTIONS.iter().enumerate() {
-            let mean = total(entry) / histories as f64;
-            let deviation = |l: &Vec<u64>| (l[entry] as i64 as f64 / FIXED_ONE / per_batch - mean).powi(2);
-            let variance = ledgers.iter().map(deviation).sum::<f64>() / (batches - 1.0) / batches;
-            let error = if ledgers.len() > 1 { json!(variance.sqrt()) } else { Value::Null };
-            fractions.insert((*name).into(), json!({"value": mean, "standard_error": error}));
-        }
-        json!({
-            "photons": histories,
-            "ledger": fractions,
-            "mean_scatterings": total(8) / histories as f64,
-            "faults": total(9).round() as u64,
-            "mean_path_mm": total(10) / histories as f64,
-            "tally": self.tally,
-            "estimator": self.estimator,
-        })
+        Ok(FieldResult { volume, result: self.report(&Ledgers::new(ledgers, histories), grid) })
     }
 }

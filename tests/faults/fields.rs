@@ -111,7 +111,7 @@ fn cases() -> Vec<(&'static str, Value, &'static str)> {
         ("/volume", json!({"photon_transport": {"photons": 0}}), "/volume/photon_transport/photons"),
         ("/volume", json!({"photon_transport": {"photons": 1_000_000_001}}), "/volume/photon_transport/photons"),
         ("/volume", json!({"photon_transport": {"albedo": 1.01}}), "/volume/photon_transport/albedo"),
-        ("/volume", json!({"photon_transport": {"grid": [3, 64, 64]}}), "/volume/photon_transport/grid/0"),
+        ("/volume", json!({"photon_transport": {"grid": [0, 64, 64]}}), "/volume/photon_transport/grid/0"),
         ("/volume", json!({"photon_transport": {"grid": [64, 64, 513]}}), "/volume/photon_transport/grid/2"),
         ("/volume", json!({"photon_transport": {"grid": [64, 64]}}), "/volume/photon_transport/grid"),
         ("/volume", json!({"photon_transport": {"size_mm": [1, 0, 1]}}), "/volume/photon_transport/size_mm/1"),

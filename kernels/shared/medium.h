@@ -1,0 +1,128 @@
+// What a photon flies through: a box of media, cut by walls at which it must look again. GEOMETRY says where a medium is,
+//   BOX      one everywhere               LABELS   one per voxel, by its number
+//   LAYERS   one per layer along z        DENSITY  one whose extinction is times a voxel's density
+// and TRACKING how a free path is found:
+//   EXACT    walls are where the extinction changes (Amanatides & Woo, Eurographics 1987, for voxels): tau = sum sigma_i s_i
+//   MARCH    steps of one length, each with the extinction at its start; a path ends with the step that uses it up
+//   DELTA    walls of coarse blocks, tentative collisions by the block's majorant m, real ones with probability sigma / m
+//            (Woodcock et al., ANL-7050, 1965)
+//   WEIGHTED the same where m may be too small: real with probability P = sigma / (sigma + |m - sigma|), weight times
+//            sigma / (m P) or (m - sigma) / (m (1 - P)) (Galtier et al., JQSRT 125, 2013)
+#define BOX 0
+#define LAYERS 1
+#define LABELS 2
+#define DENSITY 3
+#define EXACT 0
+#define MARCH 1
+#define DELTA 2
+#define WEIGHTED 3
+
+#define VOXEL_WALLS (TRACKING == EXACT && GEOMETRY >= LABELS)
+#define LAYER_WALLS (TRACKING == EXACT && GEOMETRY == LAYERS)
+#define BLOCK_WALLS (TRACKING >= DELTA)
+
+// Where a photon is between its walls: a voxel, a layer (z) or a block.
+typedef struct { Int x, y, z; } Cell;
+
+static inline Int cell_axis(constant const PhotonTransport *params, int axis, Real p) {
+    Int at = to_int(floor((p - params->low_mm[axis]) * params->walls_per_mm[axis]));
+    return clamp(at, (Int)(0), (Int)(params->walls[axis] - 1));
+}
+
+static inline Int layer_at(constant const PhotonTransport *params, global const float *table, Real z) {
+    Int layer = (Int)(0);
+    for (int i = 1; i < params->layers; i++) layer -= MASK(z >= table[params->at_layers + i]);
+    return layer;
+}
+
+static inline Cell cell_at(constant const PhotonTransport *params, global const float *table, Real3 p) {
+    Cell c;
+#if VOXEL_WALLS || BLOCK_WALLS
+    c.x = cell_axis(params, 0, p.x), c.y = cell_axis(params, 1, p.y), c.z = cell_axis(params, 2, p.z);
+#else
+    c.x = c.y = c.z = (Int)(0);
+#endif
+#if LAYER_WALLS
+    c.z = layer_at(params, table, p.z);
+#endif
+    return c;
+}
+
+// The wall ahead along an axis.
+static inline Real wall_ahead(constant const PhotonTransport *params, global const float *table, int axis, Int cell, Mask up) {
+#if LAYER_WALLS
+    if (axis == 2) return gather_reals(table + params->at_layers, select(cell, cell + 1, up));
+#endif
+#if VOXEL_WALLS || BLOCK_WALLS
+    Int next = select(cell, cell + 1, up);
+    Real wall = mad(to_real(next), (Real)(params->wall_mm[axis]), (Real)(params->low_mm[axis]));
+    return select(wall, (Real)(params->high_mm[axis]), MASK(next >= params->walls[axis]));
+#else
+    return select((Real)(params->low_mm[axis]), (Real)(params->high_mm[axis]), up);
+#endif
+}
+
+static inline Real distance_to(Real wall, Real p, Real d) {
+    return select(fmax((wall - p) / d, (Real)(0.0f)), (Real)(1e30f), MASK(fabs(d) < 1e-12f));
+}
+
+// The voxel of the grid at a place; voxels beyond it are those at its edge.
+static inline Int voxel_at(constant const PhotonTransport *params, Real3 p) {
+    Int x = to_int(floor(p.x * params->voxels_per_mm[0])), y = to_int(floor(p.y * params->voxels_per_mm[1]));
+    Int z = to_int(floor(p.z * params->voxels_per_mm[2]));
+    x = clamp(x, (Int)(0), (Int)(params->grid[0] - 1)), y = clamp(y, (Int)(0), (Int)(params->grid[1] - 1));
+    z = clamp(z, (Int)(0), (Int)(params->grid[2] - 1));
+    return (z * params->grid[1] + y) * params->grid[0] + x;
+}
+
+static inline Int cell_voxel(constant const PhotonTransport *params, Cell c) {
+    return (c.z * params->grid[1] + c.y) * params->grid[0] + c.x;
+}
+
+// Which medium is there; with voxel or layer walls the cell says it.
+static inline Int medium_of(constant const PhotonTransport *params, global const float *table, Cell c, Real3 p) {
+#if GEOMETRY == LAYERS
+    return LAYER_WALLS ? c.z : layer_at(params, table, p.z);
+#elif GEOMETRY == LABELS
+    Int voxel = VOXEL_WALLS ? cell_voxel(params, c) : voxel_at(params, p);
+    return to_int(gather_reals(table + params->at_voxels, voxel));
+#else
+    return (Int)(0);
+#endif
+}
+
+// One number of a medium.
+static inline Real medium_number(global const float *table, Int medium, int number) {
+#if GEOMETRY == BOX || GEOMETRY == DENSITY
+    return (Real)(table[number]);
+#else
+    return gather_reals(table + number, medium * MEDIUM_FLOATS);
+#endif
+}
+
+static inline Medium medium_all(global const float *table, Int medium) {
+    Medium m;
+    m.extinction = medium_number(table, medium, 0), m.albedo = medium_number(table, medium, 1);
+    m.index = medium_number(table, medium, 2), m.kind = to_int(medium_number(table, medium, 3));
+    m.a = medium_number(table, medium, 4), m.b = medium_number(table, medium, 5), m.c = medium_number(table, medium, 6);
+    return m;
+}
+
+// The extinction there, per mm.
+static inline Real extinction_at(constant const PhotonTransport *params, global const float *table, Int medium, Cell c, Real3 p) {
+    Real extinction = medium_number(table, medium, 0);
+#if GEOMETRY == DENSITY
+    Int voxel = VOXEL_WALLS ? cell_voxel(params, c) : voxel_at(params, p);
+    extinction *= gather_reals(table + params->at_voxels, voxel);
+#endif
+    return extinction;
+}
+
+// How often a free path ends in the cell, per mm: the extinction, or the block's majorant.
+static inline Real collision_rate(constant const PhotonTransport *params, global const float *table, Int medium, Cell c, Real3 p) {
+#if BLOCK_WALLS
+    return gather_reals(table + params->at_blocks, (c.z * params->walls[1] + c.y) * params->walls[0] + c.x);
+#else
+    return extinction_at(params, table, medium, c, p);
+#endif
+}

@@ -1,0 +1,106 @@
+// A packet of photons: one a lane. Places and ways are in mm from the box's corner.
+typedef struct {
+    Real3 p, d;          // d of unit length
+    Cell cell;
+    Real weight;
+    Real depth;          // what is left of the free path, in optical depth
+    Real optical;        // path times refractive index so far
+    UInt number, event;  // key its random numbers
+    Int scatterings;
+} Photon;
+
+// Four numbers of a photon's next event; `what` tells the draws of one event apart.
+static inline UInt4Lanes draw(constant const FieldPass *pass, const Photon *photon, UInt lane_first, uint what) {
+    UInt low = pass->first[0] + lane_first + photon->number;
+    UInt high = pass->first[1] + as_UInt(select((Int)(0), (Int)(1), MASK(low < pass->first[0])));
+    UInt4Lanes ctr = {low, high, photon->event, (UInt)(0x70686f74u + what)};
+    return philox(ctr, pass->seed[0], pass->seed[1]);
+}
+
+#define SOURCE_PENCIL 0
+#define SOURCE_ISOTROPIC 1
+#define SOURCE_PLANAR 2
+#define SOURCE_DISK 3
+#define SOURCE_CONE 4
+#define SOURCE_DIFFUSE 5
+
+// Where and whither a source sends the photon.
+static inline void launch(constant const FieldPass *pass, constant const PhotonTransport *params, UInt lane_first, Photon *photon) {
+    UInt4Lanes r = draw(pass, photon, lane_first, 0);
+    constant const float *at = params->source, *axis = params->source_axis;
+    photon->p = real3(at[0], at[1], at[2]);
+    photon->d = real3(axis[0], axis[1], axis[2]);
+    photon->depth = -log(unit_open(r.c));
+    Real u = unit_open(r.a), v = unit_open(r.b);
+    if (params->source_type == SOURCE_ISOTROPIC || params->source_type == SOURCE_CONE) {
+        Real one_minus = u * (1.0f - params->source_cos_from);
+        photon->d = turned(photon->d, one_minus, 2.0f - one_minus, v);
+    }
+    if (params->source_type == SOURCE_DIFFUSE) {
+        Real cosine = sqrt(u);
+        photon->d = turned(photon->d, 1.0f - cosine, 1.0f + cosine, v);
+    }
+    if (params->source_type == SOURCE_PLANAR || params->source_type == SOURCE_DISK || params->source_type == SOURCE_DIFFUSE) {
+        UInt4Lanes s = draw(pass, photon, lane_first, 1);
+        u = unit_open(s.a), v = unit_open(s.b);
+        if (params->source_type != SOURCE_PLANAR) {
+            Real sine, cosine, radius = sqrt(u);
+            turn(v, &sine, &cosine);
+            u = radius * cosine, v = radius * sine;
+        }
+        constant const float *a = params->source_u, *b = params->source_v;
+        photon->p = real3(at[0] + u * a[0] + v * b[0], at[1] + u * a[1] + v * b[1], at[2] + u * a[2] + v * b[2]);
+    }
+}
+
+// Takes a photon from where it was launched to the box, where it is bent and in part reflected. What misses the box is `missed`.
+static inline void enter(constant const PhotonTransport *params, global const float *table, Mask fresh, Photon *photon, ULong *specular,
+                         Mask *missed) {
+    Real near = (Real)(-1e30f), far = (Real)(1e30f);
+    Int axis = (Int)(0);
+    #define AXIS(i, c)                                                                                                     \
+        {                                                                                                                  \
+            Real d = select(photon->d.c, copysign((Real)(1e-20f), photon->d.c), MASK(fabs(photon->d.c) < 1e-20f));          \
+            Real a = (params->low_mm[i] - photon->p.c) / d, b = (params->high_mm[i] - photon->p.c) / d, from = fmin(a, b); \
+            axis = select(axis, (Int)(i), MASK(from > near));                                                              \
+            near = fmax(near, from), far = fmin(far, fmax(a, b));                                                          \
+        }
+    AXIS(0, x)
+    AXIS(1, y)
+    AXIS(2, z)
+    #undef AXIS
+    *missed = fresh & (MASK(near > far) | MASK(far < 0.0f));
+    Mask outside = fresh & ~*missed & MASK(near >= 0.0f);
+    Real t = select((Real)(0.0f), near, outside), cos_in = (Real)(0.0f);
+    photon->p = along(photon->p, photon->d, t);
+    #define AXIS(i, c)                                                                                                     \
+        {                                                                                                                  \
+            Mask here = outside & MASK(axis == i), up = MASK(photon->d.c > 0.0f);                                          \
+            photon->p.c = select(photon->p.c, select((Real)(params->high_mm[i]), (Real)(params->low_mm[i]), up), here);     \
+            photon->p.c = select(photon->p.c, clamp(photon->p.c, (Real)(params->low_mm[i]), (Real)(params->high_mm[i])), fresh & ~*missed); \
+            cos_in = select(cos_in, fabs(photon->d.c), here);                                                              \
+        }
+    AXIS(0, x)
+    AXIS(1, y)
+    AXIS(2, z)
+    #undef AXIS
+    photon->cell = cell_at(params, table, photon->p);
+    if (!params->fresnel || params->source_type == SOURCE_ISOTROPIC || !any_lane(outside)) return;
+    Real index = medium_number(table, medium_of(params, table, photon->cell, photon->p), 2), eta = params->outside_index / index, cos_out;
+    Real reflected = fresnel(cos_in, eta, &cos_out);
+    reflected = select((Real)(0.0f), reflected, outside & MASK(eta != 1.0f));
+    if (params->specular_entry) {
+        Real lost = photon->weight * reflected;
+        gain(specular, lost, outside);
+        photon->weight = select(photon->weight, photon->weight - lost, outside);
+    }
+    Mask bent = outside & MASK(eta != 1.0f) & MASK(reflected < 1.0f);
+    #define AXIS(i, c)                                                                                                     \
+        photon->d.c = select(photon->d.c, select(photon->d.c * eta, copysign(cos_out, photon->d.c), MASK(axis == i)), bent);
+    AXIS(0, x)
+    AXIS(1, y)
+    AXIS(2, z)
+    #undef AXIS
+    Mask inner = bent & MASK(photon->weight > 0.0f);
+    photon->d = select3(photon->d, scale3(photon->d, rsqrt(fmax(dot3(photon->d, photon->d), (Real)(1e-20f)))), inner);
+}

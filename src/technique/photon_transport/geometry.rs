@@ -1,0 +1,321 @@
+//! Where which medium is: in the whole box, in layers, by a label volume or by a density.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use super::Parameters;
+use super::medium::{Medium, Phase};
+use crate::error::{Error, Result};
+use crate::volume::{Store, Volume, builtin};
+
+/// A volume whose voxels say what is where.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GridRequest {
+    /// The id of an uploaded volume.
+    id: Option<String>,
+    /// The name of a built-in volume.
+    builtin: Option<String>,
+    /// Voxels a side of a built-in volume. Default 64.
+    #[schemars(range(min = 8, max = 512))]
+    resolution: Option<u32>,
+    /// Seed of a built-in volume that is made of random numbers.
+    #[schemars(range(min = 0, max = 9_007_199_254_740_991u64))]
+    seed: Option<u64>,
+}
+
+/// A layer along z.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Layer {
+    /// Its thickness; the last may be `"infinite"`.
+    #[schemars(schema_with = "thickness_schema")]
+    thickness_mm: Value,
+    /// Absorption coefficient.
+    #[schemars(range(min = 0, max = 1e6))]
+    #[serde(default = "absorption")]
+    mu_a_per_mm: f64,
+    /// Scattering coefficient.
+    #[schemars(range(min = 0, max = 1e6))]
+    #[serde(default = "scattering")]
+    mu_s_per_mm: f64,
+    /// Refractive index.
+    #[schemars(range(min = 1, max = 4))]
+    #[serde(default = "index")]
+    index: f64,
+    /// How a collision turns a photon.
+    #[serde(default)]
+    phase: Phase,
+}
+
+fn absorption() -> f64 {
+    Medium::default().mu_a_per_mm
+}
+
+fn scattering() -> f64 {
+    Medium::default().mu_s_per_mm
+}
+
+fn index() -> f64 {
+    Medium::default().index
+}
+
+fn thickness_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+    schemars::json_schema!({"description": "Its thickness in mm, more than 0; the last may be \"infinite\".", "type": ["number", "string"]})
+}
+
+impl Layer {
+    fn medium(&self) -> Medium {
+        let (mu_a_per_mm, mu_s_per_mm) = (self.mu_a_per_mm, self.mu_s_per_mm);
+        Medium { mu_a_per_mm, mu_s_per_mm, index: self.index, phase: self.phase.clone() }
+    }
+}
+
+/// What is where.
+#[derive(Debug, Clone)]
+pub enum Where {
+    /// One medium.
+    Box,
+    /// Layers by their ends along z; the last end may be infinite.
+    Layers(Vec<f64>),
+    /// A medium per voxel.
+    Labels(Vec<u16>),
+    /// The medium's extinction times this.
+    Density(Vec<f32>),
+}
+
+/// A box of media with its grid.
+#[derive(Debug, Clone)]
+pub struct Geometry {
+    /// What is where.
+    pub place: Where,
+    /// The media, by number.
+    pub media: Vec<Medium>,
+    /// Size of the grid.
+    pub size_mm: [f64; 3],
+    /// Its voxels.
+    pub dims: [usize; 3],
+    /// Whether it is the lecture's chamber.
+    pub chamber: bool,
+}
+
+fn volume(request: &GridRequest, store: &Store, at: &str) -> Result<std::sync::Arc<Volume>> {
+    match (&request.id, &request.builtin) {
+        (Some(id), None) => store.get(id).map_err(|e| match e {
+            Error::NotFound { .. } => {
+                Error::invalid(format!("{at}/id"), format!("there is no volume '{id}'"), "an id from /v1/volumes")
+            }
+            other => other,
+        }),
+        (None, Some(name)) if builtin::NAMES.contains(&name.as_str()) => {
+            store.builtin(name, request.resolution.unwrap_or(64) as usize, request.seed.unwrap_or(0))
+        }
+        (None, Some(name)) => {
+            let permitted = builtin::NAMES.join(", ");
+            Err(Error::invalid(format!("{at}/builtin"), format!("there is no built-in volume '{name}'"), permitted))
+        }
+        _ => Err(Error::invalid(at, "a volume is named by exactly one of id and builtin", "id or builtin")),
+    }
+}
+
+impl Geometry {
+    /// The geometry of a request.
+    ///
+    /// # Errors
+    /// More than one kind of it, layers without end before the last, labels without a medium, densities below 0.
+    pub fn new(p: &Parameters, store: &Store, at: &str) -> Result<Self> {
+        let given = [("media", p.media.is_some()), ("layers", p.layers.is_some()), ("medium", p.medium.is_some())];
+        if given.iter().filter(|g| g.1).count() > 1 {
+            let names: Vec<&str> = given.iter().filter(|g| g.1).map(|g| g.0).collect();
+            return Err(Error::invalid(
+                format!("{at}/{}", names[0]),
+                format!("given beside {}", names[1]),
+                "one of medium, media, layers",
+            ));
+        }
+        for (name, set, needs, there) in [
+            ("labels", p.labels.is_some(), "media", p.media.is_some()),
+            ("media", p.media.is_some(), "labels", p.labels.is_some()),
+        ] {
+            if set && !there {
+                return Err(Error::invalid(
+                    format!("{at}/{name}"),
+                    format!("{name} without {needs}"),
+                    format!("{name} with {needs}"),
+                ));
+            }
+        }
+        if p.density.is_some() && (p.labels.is_some() || p.layers.is_some()) {
+            return Err(Error::invalid(
+                format!("{at}/density"),
+                "given beside labels or layers",
+                "density with a medium",
+            ));
+        }
+        let geometry = if let Some(layers) = &p.layers {
+            Self::layers(p, layers, at)
+        } else if let (Some(labels), Some(media)) = (&p.labels, &p.media) {
+            Self::labels(p, &*volume(labels, store, &format!("{at}/labels"))?, media, at)
+        } else if let Some(density) = &p.density {
+            Self::density(p, &*volume(density, store, &format!("{at}/density"))?, at)
+        } else if let Some(medium) = &p.medium {
+            let size_mm = p.size_mm.unwrap_or([60.0; 3]);
+            Ok(Self { place: Where::Box, media: vec![medium.clone()], size_mm, dims: p.dims([60; 3]), chamber: false })
+        } else {
+            Ok(Self::chamber(p))
+        }?;
+        if !geometry.chamber {
+            for (name, set) in [("albedo", p.albedo.is_some()), ("extinction_scale", p.extinction_scale.is_some())] {
+                if set {
+                    return Err(Error::invalid(
+                        format!("{at}/{name}"),
+                        "only for the chamber",
+                        "leave it out: the media say it",
+                    ));
+                }
+            }
+        }
+        for (i, medium) in geometry.media.iter().enumerate() {
+            let place = match geometry.place {
+                Where::Layers(_) => format!("{at}/layers/{i}/phase"),
+                Where::Labels(_) => format!("{at}/media/{i}/phase"),
+                _ => format!("{at}/medium/phase"),
+            };
+            medium.phase.check(&place)?;
+        }
+        Ok(geometry)
+    }
+
+    fn layers(p: &Parameters, layers: &[Layer], at: &str) -> Result<Self> {
+        let mut ends = Vec::new();
+        let mut depth = 0.0;
+        for (i, layer) in layers.iter().enumerate() {
+            let pointer = || format!("{at}/layers/{i}/thickness_mm");
+            depth += match &layer.thickness_mm {
+                Value::String(word) if word == "infinite" && i + 1 == layers.len() => f64::INFINITY,
+                Value::Number(n) => n
+                    .as_f64()
+                    .filter(|t| (1e-6..=1e6).contains(t))
+                    .ok_or_else(|| Error::invalid(pointer(), "not a thickness", "0.000001 to 1000000"))?,
+                _ => {
+                    return Err(Error::invalid(
+                        pointer(),
+                        "not a thickness",
+                        "a number of mm; the last may be \"infinite\"",
+                    ));
+                }
+            };
+            ends.push(depth);
+        }
+        let mut size_mm = p.size_mm.unwrap_or([60.0; 3]);
+        let finite = ends.iter().rev().find(|e| e.is_finite()).copied().unwrap_or(0.0);
+        if depth.is_finite() {
+            size_mm[2] = depth;
+        } else if size_mm[2] <= finite {
+            let permitted = format!("more than {finite}, where the last layer starts");
+            return Err(Error::invalid(format!("{at}/size_mm/2"), "the grid ends before the last layer", permitted));
+        }
+        let media = layers.iter().map(Layer::medium).collect();
+        Ok(Self { place: Where::Layers(ends), media, size_mm, dims: p.dims([60; 3]), chamber: false })
+    }
+
+    /// The grid of a volume: its voxels, and its size unless the request gives one.
+    fn grid_of(p: &Parameters, volume: &Volume, at: &str) -> Result<([usize; 3], [f64; 3])> {
+        let dims = volume.dims();
+        if let Some(grid) = p.grid
+            && grid.map(|n| n as usize) != dims
+        {
+            return Err(Error::invalid(format!("{at}/grid"), "the grid is the volume's", json!(dims).to_string()));
+        }
+        if dims.iter().any(|&n| n > 512) {
+            return Err(Error::invalid(at, "the volume is too large to simulate", "512 voxels a side"));
+        }
+        let spacing = volume.spacing();
+        Ok((dims, p.size_mm.unwrap_or(std::array::from_fn(|a| dims[a] as f64 * spacing[a]))))
+    }
+
+    fn labels(p: &Parameters, volume: &Volume, media: &[Medium], at: &str) -> Result<Self> {
+        let (dims, size_mm) = Self::grid_of(p, volume, at)?;
+        let values =
+            (0..volume.voxels().len()).map(|i| f64::from(volume.voxels().get_f32(i)) * volume.slope() + volume.inter());
+        let labels = values
+            .map(|v| if v.fract() == 0.0 && (0.0..media.len() as f64).contains(&v) { Ok(v as u16) } else { Err(v) })
+            .collect::<std::result::Result<Vec<u16>, f64>>()
+            .map_err(|v| {
+                Error::invalid(
+                    format!("{at}/labels"),
+                    format!("there is a voxel of {v}"),
+                    format!("whole numbers from 0 to {}", media.len() - 1),
+                )
+            })?;
+        Ok(Self { place: Where::Labels(labels), media: media.to_vec(), size_mm, dims, chamber: false })
+    }
+
+    fn density(p: &Parameters, volume: &Volume, at: &str) -> Result<Self> {
+        let (dims, size_mm) = Self::grid_of(p, volume, at)?;
+        let value = |i: usize| (f64::from(volume.voxels().get_f32(i)) * volume.slope() + volume.inter()) as f32;
+        let density: Vec<f32> = (0..volume.voxels().len()).map(value).collect();
+        if let Some(bad) = density.iter().find(|v| !(0.0..=1e9).contains(*v)) {
+            return Err(Error::invalid(
+                format!("{at}/density"),
+                format!("there is a voxel of {bad}"),
+                "densities from 0 to 1000000000",
+            ));
+        }
+        let medium = p.medium.clone().unwrap_or_else(|| Medium { index: 1.0, ..Medium::default() });
+        Ok(Self { place: Where::Density(density), media: vec![medium], size_mm, dims, chamber: false })
+    }
+
+    /// The lecture's chamber, whose densities are per mm.
+    fn chamber(p: &Parameters) -> Self {
+        let dims = p.dims([64; 3]);
+        let albedo = p.albedo.unwrap_or(0.9);
+        let scale = p.extinction_scale.unwrap_or(1.0);
+        let centre = |i: usize, n: usize| (i as f64 + 0.5) / n as f64;
+        let [nx, ny, nz] = dims;
+        let mut density = Vec::with_capacity(nx * ny * nz);
+        for z in 0..nz {
+            for y in 0..ny {
+                density.extend(
+                    (0..nx)
+                        .map(|x| (builtin::chamber_value(centre(x, nx), centre(y, ny), centre(z, nz)) * scale) as f32),
+                );
+            }
+        }
+        let medium = Medium { mu_a_per_mm: 1.0 - albedo, mu_s_per_mm: albedo, index: 1.0, phase: Phase::default() };
+        let size_mm = p.size_mm.unwrap_or([1.0; 3]);
+        Self { place: Where::Density(density), media: vec![medium], size_mm, dims, chamber: true }
+    }
+
+    /// Whether refractive indices differ within it.
+    pub fn bends(&self) -> bool {
+        self.media.iter().any(|m| m.index != self.media[0].index)
+    }
+
+    /// Extinction of every voxel, per mm, for the kinds that have voxels.
+    pub fn voxel_extinction_per_mm(&self) -> Option<Vec<f32>> {
+        match &self.place {
+            Where::Labels(labels) => {
+                let of: Vec<f32> = self.media.iter().map(|m| m.extinction_per_mm() as f32).collect();
+                Some(labels.iter().map(|&l| of[l as usize]).collect())
+            }
+            Where::Density(density) => {
+                let extinction = self.media[0].extinction_per_mm() as f32;
+                Some(density.iter().map(|d| d * extinction).collect())
+            }
+            _ => None,
+        }
+    }
+
+    /// Least and greatest extinction anywhere, per mm.
+    pub fn extinction_range_per_mm(&self) -> [f64; 2] {
+        let range = |values: &mut dyn Iterator<Item = f64>| {
+            values.fold([f64::INFINITY, 0.0], |[a, b], v| [f64::min(a, v), f64::max(b, v)])
+        };
+        match self.voxel_extinction_per_mm() {
+            Some(voxels) => range(&mut voxels.into_iter().map(f64::from)),
+            None => range(&mut self.media.iter().map(Medium::extinction_per_mm)),
+        }
+    }
+}

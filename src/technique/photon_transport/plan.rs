@@ -1,0 +1,214 @@
+//! What `photon_transport` has the device run.
+
+use std::f64::consts::PI;
+
+use super::geometry::{Geometry, Where};
+use super::tracking::{Tracking, majorants};
+use super::{LEDGER_BINS, PHOTONS_PER_LANE, Parameters, PhotonTransport, Simulation, TECHNIQUE, medium};
+use crate::device::program::Variant;
+use crate::technique::FieldPlan;
+
+/// Light in a vacuum, mm per ns.
+const LIGHT_MM_PER_NS: f64 = 299.792_458;
+/// What stands for no end.
+const ENDLESS_MM: f32 = 1e30;
+
+type Features = [(&'static str, i32); 2];
+
+/// Every geometry with every tracker; the first is the chamber's, the second the homogeneous box.
+pub(super) static FEATURES: [Features; 16] = {
+    const fn of(geometry: i32, tracking: i32) -> Features {
+        [("GEOMETRY", geometry), ("TRACKING", tracking)]
+    }
+    [
+        of(3, 0),
+        of(0, 0),
+        of(1, 0),
+        of(2, 0),
+        of(0, 1),
+        of(1, 1),
+        of(2, 1),
+        of(3, 1),
+        of(0, 2),
+        of(1, 2),
+        of(2, 2),
+        of(3, 2),
+        of(0, 3),
+        of(1, 3),
+        of(2, 3),
+        of(3, 3),
+    ]
+};
+
+fn features(geometry: &Geometry, tracking: Tracking) -> &'static Features {
+    let place = match geometry.place {
+        Where::Box => 0,
+        Where::Layers(_) => 1,
+        Where::Labels(_) => 2,
+        Where::Density(_) => 3,
+    };
+    let wanted = [("GEOMETRY", place), ("TRACKING", tracking as i32)];
+    FEATURES.iter().find(|f| **f == wanted).unwrap_or(&FEATURES[0])
+}
+
+/// Appends to the table and says where.
+fn append(table: &mut Vec<f32>, more: impl IntoIterator<Item = f32>) -> i32 {
+    let at = table.len() as i32;
+    table.extend(more);
+    at
+}
+
+impl Simulation {
+    pub(super) fn spacing_mm(&self) -> [f64; 3] {
+        std::array::from_fn(|a| self.geometry.size_mm[a] / self.geometry.dims[a] as f64)
+    }
+
+    /// What a deposit is multiplied with, so that it is neither too large nor too small for the fixed point; undone in the end.
+    pub(super) fn deposit_scale(&self) -> f64 {
+        if self.is_absorbed() && !self.track { 1.0 } else { 1.0 / self.spacing_mm()[0] }
+    }
+
+    /// The length that mean paths are counted in.
+    pub(super) fn path_unit_mm(&self) -> f64 {
+        self.geometry.size_mm.iter().map(|s| s * s).sum::<f64>().sqrt() / 1_048_576.0
+    }
+
+    pub(super) fn is_absorbed(&self) -> bool {
+        self.parameters.tally == "absorbed"
+    }
+
+    fn tally_code(&self) -> i32 {
+        match (self.parameters.tally.as_str(), self.track) {
+            ("absorbed", false) => 0,
+            ("fluence", false) => 1,
+            ("fluence", true) => 2,
+            ("radiance_gather", _) => 3,
+            _ => 4,
+        }
+    }
+
+    /// Walls at which the kernel looks again: voxels, layers, blocks, or the box alone.
+    fn walls(&self, device: &mut PhotonTransport, table: &mut Vec<f32>) {
+        let g = &self.geometry;
+        device.walls = [1; 3];
+        match (&g.place, self.tracking) {
+            (Where::Labels(_) | Where::Density(_), Tracking::Exact) => {
+                device.walls = g.dims.map(|n| n as i32);
+                device.wall_mm = self.spacing_mm().map(|s| s as f32);
+            }
+            (Where::Layers(ends), Tracking::Exact) => device.walls[2] = ends.len() as i32,
+            (_, Tracking::Delta | Tracking::Weighted) => {
+                let m = majorants(&self.parameters, g);
+                device.walls = m.blocks.map(|n| n as i32);
+                let spacing = self.spacing_mm();
+                device.wall_mm = std::array::from_fn(|a| (m.voxels[a] as f64 * spacing[a]) as f32);
+                device.at_blocks = append(table, m.per_mm);
+            }
+            _ => {}
+        }
+        device.walls_per_mm = std::array::from_fn(|a| if device.walls[a] > 1 { 1.0 / device.wall_mm[a] } else { 0.0 });
+    }
+
+    fn bounds(&self, device: &mut PhotonTransport) {
+        let p = &self.parameters;
+        device.high_mm = self.geometry.size_mm.map(|s| s as f32);
+        device.size_mm = device.high_mm;
+        let layered = matches!(self.geometry.place, Where::Layers(_));
+        for (a, kind) in [&p.boundary.x, &p.boundary.y, &p.boundary.z].into_iter().enumerate() {
+            device.boundary[a] = match kind.as_deref() {
+                Some("cyclic") => 1,
+                Some("mirror") => 2,
+                _ => 0,
+            };
+            // Layers go on to all sides unless the request says where they end.
+            if layered && a < 2 && kind.is_none() {
+                (device.low_mm[a], device.high_mm[a], device.endless) = (-ENDLESS_MM, ENDLESS_MM, 1);
+            }
+        }
+        if let Where::Layers(ends) = &self.geometry.place
+            && ends.last().is_some_and(|e| e.is_infinite())
+        {
+            (device.high_mm[2], device.endless) = (ENDLESS_MM, 1);
+        }
+    }
+
+    pub(super) fn device_plan(&self) -> FieldPlan {
+        let (p, g) = (&self.parameters, &self.geometry);
+        let media: Vec<_> = g.media.iter().collect();
+        let mut table = medium::table(&media);
+        let spacing = self.spacing_mm();
+        let mut device = PhotonTransport {
+            grid: g.dims.map(|n| n as i32),
+            voxel_mm: spacing.map(|s| s as f32),
+            voxels_per_mm: spacing.map(|s| (1.0 / s) as f32),
+            outside_index: p.boundary.outside_index as f32,
+            fresnel: p.boundary.fresnel.into(),
+            specular_entry: p.boundary.specular_entry.into(),
+            mismatch: g.bends().into(),
+            gate_mm: p.time_gate_ns.map_or(ENDLESS_MM, |ns| (ns * LIGHT_MM_PER_NS) as f32),
+            march_step_mm: self.march_step_mm() as f32,
+            roulette_threshold: p.roulette.threshold as f32,
+            roulette_survival: p.roulette.survival as f32,
+            tally: self.tally_code(),
+            deposit_scale: self.deposit_scale() as f32,
+            paths_per_mm: (1.0 / self.path_unit_mm()) as f32,
+            eye_mm: self.eye_mm().map(|v| v as f32),
+            beam_mm: [self.source.position_mm.x as f32, self.source.position_mm.y as f32],
+            ..PhotonTransport::default()
+        };
+        self.source.apply(&mut device);
+        self.bounds(&mut device);
+        self.walls(&mut device, &mut table);
+        match &g.place {
+            Where::Box => {}
+            Where::Layers(ends) => {
+                device.layers = ends.len() as i32;
+                let ends = ends.iter().map(|e| if e.is_finite() { *e as f32 } else { ENDLESS_MM });
+                device.at_layers = append(&mut table, std::iter::once(0.0).chain(ends));
+            }
+            Where::Labels(labels) => device.at_voxels = append(&mut table, labels.iter().map(|l| f32::from(*l))),
+            Where::Density(density) => device.at_voxels = append(&mut table, density.iter().copied()),
+        }
+        let mut bins = 0;
+        if let Some(histogram) = &p.exit_histogram {
+            device.radius_bins = histogram.radius_edges_mm.len() as i32 - 1;
+            device.angle_bins = histogram.angle_edges_deg.len() as i32 - 1;
+            device.at_radii = append(&mut table, histogram.radius_edges_mm.iter().map(|r| *r as f32));
+            // The cosine at 90 degrees is not quite 0.
+            let cosine = |deg: &f64| if *deg >= 90.0 { -1.0 } else { (deg * PI / 180.0).cos() as f32 };
+            device.at_cosines = append(&mut table, histogram.angle_edges_deg.iter().map(cosine));
+            bins = 2 * device.radius_bins as usize * device.angle_bins as usize;
+        }
+        FieldPlan {
+            variant: Variant { kernel: TECHNIQUE.name, voxel: None, features: features(g, self.tracking) },
+            parameters: bytemuck::bytes_of(&device).to_vec(),
+            table,
+            cells: g.dims.iter().product(),
+            ledger: LEDGER_BINS + bins,
+            histories: p.photons,
+            histories_per_lane: PHOTONS_PER_LANE,
+            reasons: self.reasons.clone(),
+        }
+    }
+
+    /// The march's step: the request's, or a tenth of the shortest mean free path.
+    pub(super) fn march_step_mm(&self) -> f64 {
+        let shortest = 0.1 / self.geometry.extinction_range_per_mm()[1].max(1e-30);
+        self.parameters
+            .march_step_mm
+            .unwrap_or(shortest.min(self.geometry.size_mm.iter().copied().fold(f64::INFINITY, f64::min)))
+    }
+
+    /// Where the gather looks from: the request's eye, or one far before the entry face.
+    fn eye_mm(&self) -> [f64; 3] {
+        let size = self.geometry.size_mm;
+        self.parameters.eye_mm.unwrap_or([0.5 * size[0], 0.5 * size[1], -3.0 * size[2]])
+    }
+}
+
+impl Parameters {
+    /// The request's grid, or another.
+    pub(super) fn dims(&self, otherwise: [usize; 3]) -> [usize; 3] {
+        self.grid.map_or(otherwise, |g| g.map(|n| n as usize))
+    }
+}

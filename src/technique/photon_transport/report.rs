@@ -1,0 +1,111 @@
+//! What a simulation came to: the ledger as fractions of the launched weight, and what else was counted.
+
+use serde_json::{Map, Value, json};
+
+use super::{FIXED_ONE, LEDGER_BINS, Simulation};
+
+/// The ledger's fractions, in the kernel's order.
+const FRACTIONS: [&str; 12] = [
+    "exit_minus_x",
+    "exit_plus_x",
+    "exit_minus_y",
+    "exit_plus_y",
+    "exit_minus_z",
+    "exit_plus_z",
+    "absorbed",
+    "lost",
+    "specular",
+    "gated",
+    "unscattered_minus_z",
+    "unscattered_plus_z",
+];
+const SCATTERINGS: usize = 12;
+const FAULTS: usize = 13;
+const BROKEN: usize = 14;
+const MISSED: usize = 15;
+const PATH: usize = 16;
+/// Sums past this may soon wrap round.
+const OVERFLOW: i64 = 1 << 61;
+
+/// The sums of the batches.
+pub(super) struct Ledgers<'a> {
+    batches: &'a [Vec<u64>],
+    histories: u64,
+}
+
+impl<'a> Ledgers<'a> {
+    pub fn new(batches: &'a [Vec<u64>], histories: u64) -> Self {
+        Self { batches, histories }
+    }
+
+    fn sum(&self, entry: usize) -> i64 {
+        self.batches.iter().fold(0i64, |sum, l| sum.wrapping_add(l[entry] as i64))
+    }
+
+    /// A fraction of the launched weight with the standard error of its batches.
+    fn fraction(&self, entry: usize) -> Value {
+        let (n, batches) = (self.histories as f64, self.batches.len() as f64);
+        let mean = self.sum(entry) as f64 / FIXED_ONE / n;
+        let deviation = |l: &Vec<u64>| (l[entry] as i64 as f64 / FIXED_ONE / (n / batches) - mean).powi(2);
+        let variance = self.batches.iter().map(deviation).sum::<f64>() / (batches - 1.0) / batches;
+        let error = if self.batches.len() > 1 { json!(variance.sqrt()) } else { Value::Null };
+        json!({"value": mean, "standard_error": error})
+    }
+}
+
+impl Simulation {
+    pub(super) fn report(&self, ledgers: &Ledgers<'_>, grid: &[u64]) -> Value {
+        let n = ledgers.histories as f64;
+        let fractions: Map<String, Value> =
+            FRACTIONS.iter().enumerate().map(|(entry, name)| ((*name).into(), ledgers.fraction(entry))).collect();
+        let overflow = (0..LEDGER_BINS).any(|e| ledgers.sum(e).abs() > OVERFLOW)
+            || grid.iter().any(|v| (*v as i64).abs() > OVERFLOW);
+        let mut warnings = Vec::new();
+        let mut warn = |code: &str, count: i64, message: &str| {
+            if count > 0 {
+                warnings.push(json!({"code": code, "message": message, "measured": count, "bound": 0}));
+            }
+        };
+        warn("broken_majorant", ledgers.sum(BROKEN), self.broken_words());
+        warn(
+            "photon_faults",
+            ledgers.sum(FAULTS),
+            "photons took too many steps, or their weight was not finite; their weight is in lost",
+        );
+        warn("sums_overflow", i64::from(overflow), "the 64-bit sums are about to overflow: ask for fewer photons");
+        let mut result = json!({
+            "photons": ledgers.histories,
+            "ledger": fractions,
+            "mean_scatterings": ledgers.sum(SCATTERINGS) as f64 / n,
+            "mean_path_mm": ledgers.sum(PATH) as f64 * self.path_unit_mm() / n,
+            "faults": ledgers.sum(FAULTS),
+            "broken_majorants": ledgers.sum(BROKEN),
+            "missed": ledgers.sum(MISSED),
+            "overflow": overflow,
+            "tracking": self.tracking.name(),
+            "tracking_reason": self.tracking_reason,
+            "tally": self.parameters.tally,
+            "estimator": if self.track { "track_length" } else { "collision" },
+            "warnings": warnings,
+        });
+        if let Some(histogram) = &self.parameters.exit_histogram {
+            let (rings, cones) = (histogram.radius_edges_mm.len() - 1, histogram.angle_edges_deg.len() - 1);
+            let side = |side: usize| -> Vec<Vec<Value>> {
+                let bin =
+                    |ring: usize, cone: usize| ledgers.fraction(LEDGER_BINS + (side * rings + ring) * cones + cone);
+                (0..rings).map(|ring| (0..cones).map(|cone| bin(ring, cone)).collect()).collect()
+            };
+            result["exit_histogram"] = json!({"radius_edges_mm": histogram.radius_edges_mm, "angle_edges_deg": histogram.angle_edges_deg,
+                "minus_z": side(0), "plus_z": side(1)});
+        }
+        result
+    }
+
+    fn broken_words(&self) -> &'static str {
+        if self.tracking == super::tracking::Tracking::Weighted {
+            "collisions at which the majorant was below the extinction; weights make up for it, at a cost in noise"
+        } else {
+            "collisions at which the majorant was below the extinction: the result is biased"
+        }
+    }
+}
