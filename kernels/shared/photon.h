@@ -10,8 +10,8 @@ typedef struct {
 } Photon;
 
 // Four numbers of a photon's next event; `what` tells the draws of one event apart.
-static inline UInt4Lanes draw(constant const FieldPass *pass, const Photon *photon, UInt lane_first, uint what) {
-    UInt low = pass->first[0] + lane_first + photon->number;
+static inline UInt4Lanes draw(constant const FieldPass *pass, const Photon *photon, uint item_first, uint what) {
+    UInt low = (pass->first[0] + item_first) + photon->number;
     UInt high = pass->first[1] + as_UInt(select((Int)(0), (Int)(1), MASK(low < pass->first[0])));
     UInt4Lanes ctr = {low, high, photon->event, (UInt)(0x70686f74u + what)};
     return philox(ctr, pass->seed[0], pass->seed[1]);
@@ -25,8 +25,8 @@ static inline UInt4Lanes draw(constant const FieldPass *pass, const Photon *phot
 #define SOURCE_DIFFUSE 5
 
 // Where and whither a source sends the photon.
-static inline void launch(constant const FieldPass *pass, constant const PhotonTransport *params, UInt lane_first, Photon *photon) {
-    UInt4Lanes r = draw(pass, photon, lane_first, 0);
+static inline void launch(constant const FieldPass *pass, constant const PhotonTransport *params, uint item_first, Photon *photon) {
+    UInt4Lanes r = draw(pass, photon, item_first, 0);
     constant const float *at = params->source, *axis = params->source_axis;
     photon->p = real3(at[0], at[1], at[2]);
     photon->d = real3(axis[0], axis[1], axis[2]);
@@ -41,7 +41,7 @@ static inline void launch(constant const FieldPass *pass, constant const PhotonT
         photon->d = turned(photon->d, 1.0f - cosine, 1.0f + cosine, v);
     }
     if (params->source_type == SOURCE_PLANAR || params->source_type == SOURCE_DISK || params->source_type == SOURCE_DIFFUSE) {
-        UInt4Lanes s = draw(pass, photon, lane_first, 1);
+        UInt4Lanes s = draw(pass, photon, item_first, 1);
         u = unit_open(s.a), v = unit_open(s.b);
         if (params->source_type != SOURCE_PLANAR) {
             Real sine, cosine, radius = sqrt(u);

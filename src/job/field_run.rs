@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::context::{DeviceContext, warm};
 use super::pace::Pace;
-use crate::device::Buffer;
+use crate::device::{Buffer, DeviceInfo};
 use crate::error::{Error, Result};
 use crate::technique::photon_transport::FieldPass;
 use crate::technique::{self, Field, FieldPlan};
@@ -15,6 +15,19 @@ use crate::volume::Volume;
 
 /// Batches of equal size: enough for the standard errors of the ledger, and a power of two for the doublings.
 const BATCHES: u64 = 32;
+
+/// Histories of a work-item where items are many: enough that launching an item does not count.
+const HISTORIES_PER_ITEM: usize = 32;
+/// Working items for each core of a CPU: two, so that a core that was held up is waited for less.
+const ITEMS_PER_CORE: usize = 2;
+/// The grids of all items together take at most this.
+const OWN_GRIDS_BYTES: usize = 1 << 27;
+
+/// How many items work at a time with a grid each, where lanes say that the device is a CPU and the grids fit.
+fn own_grids(info: &DeviceInfo, cells: usize) -> Option<usize> {
+    let items = ITEMS_PER_CORE * info.compute_units as usize;
+    (info.lanes > 1 && 8 * cells * items <= OWN_GRIDS_BYTES).then_some(items)
+}
 
 /// A field at work.
 pub(super) struct FieldRun {
@@ -24,6 +37,8 @@ pub(super) struct FieldRun {
     parameters: Buffer,
     pass: Buffer,
     grid: Buffer,
+    /// How many items have a grid of their own; none where one is shared.
+    grids: Option<usize>,
     ledger: Buffer,
     /// The ledger's sums after the last batch, and what each batch added.
     ledger_before: Vec<u64>,
@@ -43,7 +58,8 @@ impl FieldRun {
         let table = device.upload(bytemuck::cast_slice(&plan.table), 8)?;
         let parameters = device.upload(&plan.parameters, 0)?;
         let pass = device.allocate(size_of::<FieldPass>())?;
-        let grid = device.upload(&vec![0; 8 * plan.cells], 0)?;
+        let grids = own_grids(device.info(), plan.cells);
+        let grid = device.upload(&vec![0; 8 * plan.cells * grids.unwrap_or(1)], 0)?;
         let ledger = device.upload(&vec![0; 8 * plan.ledger], 0)?;
         let ledger_before = vec![0; plan.ledger];
         let (ledgers, done, device_time) = (Vec::new(), 0, Duration::ZERO);
@@ -55,6 +71,7 @@ impl FieldRun {
             parameters,
             pass,
             grid,
+            grids,
             ledger,
             ledger_before,
             ledgers,
@@ -81,27 +98,29 @@ impl FieldRun {
     /// Works for about `slice`; `true` when the number of finished batches has reached a power of two.
     pub fn slice(&mut self, context: &mut DeviceContext, slice: Duration) -> Result<bool> {
         let info = context.device.info();
-        // A lane takes several histories one after the other, so that lanes which end early are refilled; but every core gets at
-        // least two work-groups of a slice.
-        let groups = 2 * info.compute_units as usize;
-        let fits = self.pace.items(info, slice, info.lanes as usize) / (info.local_size * groups);
-        let per_lane = (fits as u32).clamp(1, self.plan.histories_per_lane);
-        let per_item = u64::from(info.lanes * per_lane);
+        let (stride, wanted) = match self.grids {
+            // A few items with many histories each: their lanes are refilled until the last.
+            Some(grids) => (info.local_size, grids),
+            None => (1, self.pace.items(info, slice, HISTORIES_PER_ITEM)),
+        };
         let end = self.batch_end(self.ledgers.len());
-        let items = self.pace.items(info, slice, per_item as usize) as u64;
-        let count = (items * per_item).min(end - self.done);
+        let fits = self.pace.items(info, slice, 1) as u64;
+        let count = fits.max(wanted as u64).min(end - self.done);
+        let per_item = count.div_ceil(wanted as u64).max(u64::from(info.lanes));
         let seed = self.field.seed();
         let pass = FieldPass {
             first: [self.done as u32, (self.done >> 32) as u32],
             count: count as u32,
-            per_lane,
+            per_item: per_item as u32,
+            stride: stride as u32,
+            own_grids: self.grids.is_some().into(),
             seed: [seed as u32, (seed >> 32) as u32],
         };
         context.device.write(&mut self.pass, 0, bytemuck::bytes_of(&pass))?;
-        let items = count.div_ceil(per_item) as usize;
+        let items = count.div_ceil(per_item) as usize * stride;
         let arguments = [&self.pass, &self.parameters, &self.table, &self.grid, &self.ledger];
         let took = context.device.run(&self.plan.variant, &arguments, items)?;
-        self.pace.learn(items, per_item as usize, took);
+        self.pace.learn(count as usize, 1, took);
         self.device_time += took;
         self.done += count;
         if self.done < end {
@@ -128,8 +147,13 @@ impl FieldRun {
 
     /// The volume and the result so far.
     pub fn finish(&self, context: &DeviceContext) -> Result<(Arc<Volume>, Value)> {
-        let mut grid = vec![0u64; self.plan.cells];
+        let mut grid = vec![0u64; self.plan.cells * self.grids.unwrap_or(1)];
         context.device.read(&self.grid, 0, &mut grid)?;
+        let (sums, others) = grid.split_at_mut(self.plan.cells);
+        for own in others.chunks_exact(self.plan.cells) {
+            sums.iter_mut().zip(own).for_each(|(sum, v)| *sum = sum.wrapping_add(*v));
+        }
+        grid.truncate(self.plan.cells);
         let result = self.field.finish(&grid, &self.ledgers, self.done)?;
         let mut value = result.result;
         value["photons_per_ms"] = (self.done as f64 / self.device_time.as_secs_f64().max(1e-9) / 1e3).into();

@@ -160,8 +160,6 @@ pub struct FieldPlan {
     pub ledger: usize,
     /// How many histories (photons) make the whole.
     pub histories: u64,
-    /// Histories that a lane of a work-item takes one after the other, at most.
-    pub histories_per_lane: u32,
     /// Why it is planned so, in words.
     pub reasons: Vec<String>,
 }

@@ -80,8 +80,12 @@ device_struct! {
         pub first: [u32; 2],
         /// Histories in this launch.
         pub count: u32,
-        /// Histories that a lane takes one after the other.
-        pub per_lane: u32,
+        /// Histories of a work-item.
+        pub per_item: u32,
+        /// One work-item in so many works.
+        pub stride: u32,
+        /// Whether each working item has a grid of its own.
+        pub own_grids: i32,
         /// The seed, low and high word.
         pub seed: [u32; 2],
     }
@@ -171,8 +175,6 @@ device_struct! {
 
 /// `FIXED_ONE` of the kernel: sums are in units of 2^-30.
 const FIXED_ONE: f64 = 1_073_741_824.0;
-/// Photons that a lane takes one after the other, at most: enough that lanes which end early are refilled.
-const PHOTONS_PER_LANE: u32 = 32;
 /// Entries of the kernel's ledger before the histogram.
 const LEDGER_BINS: usize = 17;
 

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use super::geometry::{Geometry, Where};
 use super::tracking::{Tracking, majorants};
-use super::{LEDGER_BINS, PHOTONS_PER_LANE, Parameters, PhotonTransport, Simulation, TECHNIQUE, medium};
+use super::{LEDGER_BINS, Parameters, PhotonTransport, Simulation, TECHNIQUE, medium};
 use crate::device::program::Variant;
 use crate::technique::FieldPlan;
 
@@ -186,7 +186,6 @@ impl Simulation {
             cells: g.dims.iter().product(),
             ledger: LEDGER_BINS + bins,
             histories: p.photons,
-            histories_per_lane: PHOTONS_PER_LANE,
             reasons: self.reasons.clone(),
         }
     }
