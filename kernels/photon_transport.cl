@@ -20,6 +20,9 @@
 // A photon that takes more steps than this has met a fault of arithmetic, or never ends; it is counted as lost.
 #define MOST_STEPS 1000000
 
+// Lanes that are free before photons are launched: a launch costs as much as a few of them idle for a step or two.
+#define REFILL (LANES / 8 + 1)
+
 typedef struct { ULong absorbed, lost, specular; UInt scatterings; Real path; } Gains;
 
 typedef struct { global ulong *sums; int own; } Grid;
@@ -216,7 +219,7 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
     Mask alive = (Mask)(0);
 
     for (;;) {
-        if (taken < share && any_lane(~alive)) {
+        if (taken < share && count_lanes(~alive) >= REFILL) {
             // Each free lane takes the next photon, in the lanes' order.
             IntLanes free, next;
             free.v = ~alive;

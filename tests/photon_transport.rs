@@ -6,5 +6,11 @@ mod common;
 
 #[path = "photon_transport/oracle.rs"]
 mod oracle;
+#[path = "photon_transport/phases.rs"]
+mod phases;
+#[path = "photon_transport/published.rs"]
+mod published;
+#[path = "photon_transport/run.rs"]
+mod run;
 #[path = "photon_transport/truth.rs"]
 mod truth;

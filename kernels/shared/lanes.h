@@ -68,6 +68,21 @@ typedef union { Real v; float lane[LANES]; } RealLanes;
 typedef union { Int v; int lane[LANES]; } IntLanes;
 typedef union { ULong v; ulong lane[LANES]; } ULongLanes;
 
+// How many lanes say yes.
+static inline int count_lanes(Mask m) {
+#if LANES == 1
+    return m != 0;
+#elif LANES == 16 && defined(__AVX512DQ__) && __has_builtin(__builtin_ia32_cvtd2mask512)
+    return popcount((ushort)__builtin_ia32_cvtd2mask512(m));
+#else
+    int count = 0;
+    IntLanes lanes;
+    lanes.v = m;
+    for (int i = 0; i < LANES; i++) count -= lanes.lane[i];
+    return count;
+#endif
+}
+
 #if LANES == 1
 static inline float least_lane(Real v) { return v; }
 #else
