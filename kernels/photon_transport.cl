@@ -17,9 +17,6 @@
 #define LEDGER_PATH 16 // in units of params->path_unit_mm
 #define LEDGER_BINS 17 // -z by radius and angle, then +z
 
-// A photon that takes more steps than this has met a fault of arithmetic, or never ends; it is counted as lost.
-#define MOST_STEPS 1000000
-
 // Lanes that are free before photons are launched: a launch costs as much as a few of them idle for a step or two.
 #define REFILL (LANES / 8 + 1)
 
@@ -50,7 +47,7 @@ static inline void deposit_track(constant const PhotonTransport *params, global 
     // Voxels' planes by their number, so that no plane is met twice.
     Int x = to_int(floor(p.x * params->voxels_per_mm[0])), y = to_int(floor(p.y * params->voxels_per_mm[1])), z = to_int(floor(p.z * params->voxels_per_mm[2]));
     Int up_x = -MASK(d.x > 0.0f), up_y = -MASK(d.y > 0.0f), up_z = -MASK(d.z > 0.0f);
-    for (int i = 0; i < MOST_STEPS && any_lane(on); i++) {
+    for (int i = 0; i < params->most_steps && any_lane(on); i++) {
         Real tx = (to_real(x + up_x) * params->voxel_mm[0] - p.x) / d.x, ty = (to_real(y + up_y) * params->voxel_mm[1] - p.y) / d.y;
         Real tz = (to_real(z + up_z) * params->voxel_mm[2] - p.z) / d.z;
         tx = select(tx, (Real)(1e30f), MASK(fabs(d.x) < 1e-12f)), ty = select(ty, (Real)(1e30f), MASK(fabs(d.y) < 1e-12f));
@@ -305,7 +302,7 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
         }
         steps += 1;
         alive &= ~gone & (goes_on | ~hit);
-        Mask fault = alive & (MASK(steps > MOST_STEPS) | MASK(!(fabs(photon.weight) <= 1e30f)));
+        Mask fault = alive & (MASK(steps > params->most_steps) | MASK(!(fabs(photon.weight) <= 1e30f)));
         if (any_lane(fault)) {
             gain(&gains.lost, select((Real)(0.0f), photon.weight, MASK(fabs(photon.weight) <= 1e30f)), fault);
             tally_fixed(ledger, (Int)(LEDGER_FAULTS), (ULong)(1), fault);

@@ -4,6 +4,10 @@
 
 mod common;
 
+#[path = "photon_transport/boundaries.rs"]
+mod boundaries;
+#[path = "photon_transport/extremes.rs"]
+mod extremes;
 #[path = "photon_transport/oracle.rs"]
 mod oracle;
 #[path = "photon_transport/phases.rs"]
@@ -12,5 +16,7 @@ mod phases;
 mod published;
 #[path = "photon_transport/run.rs"]
 mod run;
+#[path = "photon_transport/trackers.rs"]
+mod trackers;
 #[path = "photon_transport/truth.rs"]
 mod truth;

@@ -168,6 +168,8 @@ device_struct! {
         pub deposit_scale: f32,
         /// Paths are counted times this.
         pub paths_per_mm: f32,
+        /// A photon that takes more steps than this is trapped, or has met a fault of arithmetic; it is counted as lost.
+        pub most_steps: i32,
         /// What the gather looks from.
         pub eye_mm: [f32; 3],
     }

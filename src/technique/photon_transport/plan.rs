@@ -169,6 +169,7 @@ impl Simulation {
             Where::Labels(labels) => device.at_voxels = append(&mut table, labels.iter().map(|l| f32::from(*l))),
             Where::Density(density) => device.at_voxels = append(&mut table, density.iter().copied()),
         }
+        device.most_steps = self.most_steps(device.walls);
         let mut bins = 0;
         if let Some(histogram) = &p.exit_histogram {
             device.radius_bins = histogram.radius_edges_mm.len() as i32 - 1;
@@ -188,6 +189,13 @@ impl Simulation {
             histories: p.photons,
             reasons: self.reasons.clone(),
         }
+    }
+
+    /// In a thin box only light that total reflection keeps in takes many steps: without absorption it would never end.
+    fn most_steps(&self, walls: [i32; 3]) -> i32 {
+        let across: f64 = self.geometry.size_mm.iter().sum();
+        let thin = self.geometry.extinction_range_per_mm()[1] * across < 0.1;
+        if thin { 5_000 + 100 * walls.iter().sum::<i32>() } else { 1_000_000 }
     }
 
     /// The march's step: the request's, or a tenth of the shortest mean free path.

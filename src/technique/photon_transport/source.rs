@@ -103,15 +103,12 @@ impl Source {
             let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
             for axis in 0..3 {
                 let (o, d) = (origin[axis], self.axis[axis]);
-                let (t0, t1) = if d.abs() > 1e-15 {
-                    (-o / d, (size[axis] - o) / d)
-                } else if (0.0..=size[axis]).contains(&o) {
-                    (f64::NEG_INFINITY, f64::INFINITY)
-                } else {
-                    (f64::INFINITY, f64::NEG_INFINITY)
-                };
-                near = near.max(t0.min(t1));
-                far = far.min(t0.max(t1));
+                if d.abs() > 1e-15 {
+                    let (a, b) = (-o / d, (size[axis] - o) / d);
+                    (near, far) = (near.max(a.min(b)), far.min(a.max(b)));
+                } else if !(0.0..=size[axis]).contains(&o) {
+                    return false;
+                }
             }
             // A ray that starts on a face and shines away from the box meets it in one point.
             near < far && far > 0.0
