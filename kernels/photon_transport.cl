@@ -144,11 +144,16 @@ static inline Mask cross_wall(constant const FieldPass *pass, constant const Pho
 static inline Mask collide(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table, Grid grid,
                            global ulong *ledger, uint item_first, Real rate, Int medium, Mask hit, Photon *photon, Gains *gains) {
     UInt4Lanes r = draw(pass, photon, item_first, 0);
-    photon->event += as_UInt(select((Int)(0), (Int)(1), hit));
     photon->depth = select(photon->depth, -log(unit_open(r.c)), hit);
     Mask real = hit;
     Medium m = medium_all(table, medium);
     Real sigma = rate;
+#if GAMMA
+    m.albedo = attenuation_at(params, table, medium, photon->energy).albedo;
+    // Weight is energy: what the electron gets is absorbed as well. Below the tables all of it is.
+    Real one_minus, kept = compton(pass, photon, item_first, photon->energy, hit, &one_minus);
+    m.albedo *= select((Real)(0.0f), kept, MASK(kept * photon->energy > params->gamma_least_kev));
+#endif
 #if BLOCK_WALLS
     sigma = extinction_at(params, table, medium, photon->cell, photon->p);
     Mask broken = hit & MASK(sigma > rate * 1.000001f);
@@ -161,7 +166,10 @@ static inline Mask collide(constant const FieldPass *pass, constant const Photon
     Real factor = select(null / (rate * (1.0f - chance)), sigma / (rate * chance), real);
     photon->weight = select(photon->weight, photon->weight * factor, hit);
 #endif
-    if (!any_lane(real)) return hit;
+    if (!any_lane(real)) {
+        photon->event += as_UInt(select((Int)(0), (Int)(1), hit));
+        return hit;
+    }
 #endif
     Real absorbed = photon->weight * (1.0f - m.albedo);
     if (params->tally != TALLY_FLUENCE_TRACK && params->tally != TALLY_ABSORBED_TRACK) {
@@ -187,10 +195,16 @@ static inline Mask collide(constant const FieldPass *pass, constant const Photon
     }
     photon->weight = select(photon->weight, left, real);
     Mask goes_on = real & MASK(left != 0.0f);
+#if GAMMA
+    Real one_plus = 2.0f - one_minus;
+    photon->energy = select(photon->energy, photon->energy * kept, goes_on);
+#else
     Real one_minus, one_plus;
     sample_phase(table, &m, unit_open(r.a), &one_minus, &one_plus);
+#endif
     photon->d = select3(photon->d, turned(photon->d, one_minus, one_plus, unit_open(r.b)), goes_on);
     photon->scatterings += select((Int)(0), (Int)(1), goes_on);
+    photon->event += as_UInt(select((Int)(0), (Int)(1), hit));
     return goes_on | (hit & ~real);
 }
 
@@ -207,6 +221,7 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
     photon.p = photon.d = real3(0.0f, 0.0f, 0.0f);
     photon.cell.x = photon.cell.y = photon.cell.z = photon.scatterings = (Int)(0);
     photon.weight = photon.depth = photon.optical = (Real)(0.0f);
+    photon.energy = (Real)(params->source_kev);
     photon.number = photon.event = (UInt)(0u);
     Gains gains;
     gains.absorbed = gains.lost = gains.specular = (ULong)(0);
@@ -237,6 +252,7 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
             photon.number = as_UInt(select(as_Int(photon.number), as_Int(launched.number), fresh));
             photon.event = as_UInt(select(as_Int(photon.event), as_Int(launched.event), fresh));
             photon.scatterings = select(photon.scatterings, (Int)(0), fresh);
+            photon.energy = select(photon.energy, (Real)(params->source_kev), fresh);
             if (any_lane(missed)) {
                 gain(&gains.lost, photon.weight, missed);
                 tally_fixed(ledger, (Int)(LEDGER_MISSED), (ULong)(1), missed);
@@ -251,6 +267,12 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
 
         Int medium = medium_of(params, table, photon.cell, photon.p);
         Real rate = collision_rate(params, table, medium, photon.cell, photon.p);
+#if GAMMA
+        rate = attenuation_at(params, table, medium, photon.energy).extinction;
+#if GEOMETRY == DENSITY
+        rate *= gather_reals(table + params->at_voxels, cell_voxel(params, photon.cell));
+#endif
+#endif
         Real wx = wall_ahead(params, table, 0, photon.cell.x, MASK(photon.d.x > 0.0f)), wy = wall_ahead(params, table, 1, photon.cell.y, MASK(photon.d.y > 0.0f));
         Real wz = wall_ahead(params, table, 2, photon.cell.z, MASK(photon.d.z > 0.0f));
         Real tx = distance_to(wx, photon.p.x, photon.d.x), ty = distance_to(wy, photon.p.y, photon.d.y), tz = distance_to(wz, photon.p.z, photon.d.z);

@@ -8,6 +8,8 @@ mod common;
 mod boundaries;
 #[path = "photon_transport/extremes.rs"]
 mod extremes;
+#[path = "photon_transport/gammas.rs"]
+mod gammas;
 #[path = "photon_transport/oracle.rs"]
 mod oracle;
 #[path = "photon_transport/phases.rs"]

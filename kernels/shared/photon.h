@@ -5,6 +5,7 @@ typedef struct {
     Real weight;
     Real depth;          // what is left of the free path, in optical depth
     Real optical;        // path times refractive index so far
+    Real energy;         // of a gamma photon, keV
     UInt number, event;  // key its random numbers
     Int scatterings;
 } Photon;

@@ -15,7 +15,7 @@
 //! | `photons` | | 1–limit | 10⁶ |
 //! | `size_mm` | mm | 10⁻³–10⁶ | 60, 60, 60; the volume's; the chamber's 1, 1, 1 |
 //! | `grid` | voxels | 1–512 | 60, 60, 60; the volume's; the chamber's 64, 64, 64 |
-//! | `medium` | | absorption, scattering, index, phase | |
+//! | `medium` | | absorption, scattering, index, phase; or for gamma photons attenuation and `klein_nishina` | |
 //! | `media` with `labels` | | a medium per label of a volume | |
 //! | `layers` | | media along z | |
 //! | `density` | | extinction times a volume, with `medium` | |
@@ -35,6 +35,7 @@
 //!
 //! Example: see [`example`], which a test runs.
 
+pub mod attenuation;
 mod geometry;
 mod medium;
 mod plan;
@@ -170,6 +171,16 @@ device_struct! {
         pub paths_per_mm: f32,
         /// A photon that takes more steps than this is trapped, or has met a fault of arithmetic; it is counted as lost.
         pub most_steps: i32,
+        /// Energy of the source's gamma photons.
+        pub source_kev: f32,
+        /// Energy below which they are absorbed.
+        pub gamma_least_kev: f32,
+        /// Its logarithm to the base 2.
+        pub gamma_least_log2: f32,
+        /// Rows of the attenuation tables per octave of energy.
+        pub gamma_rows_per_log2: f32,
+        /// Attenuation and albedo of each medium by energy.
+        pub at_gamma: i32,
         /// What the gather looks from.
         pub eye_mm: [f32; 3],
     }
@@ -373,6 +384,7 @@ fn source() -> Source {
             "shared/medium.h",
             "shared/tally.h",
             "shared/photon.h",
+            "shared/compton.h",
         ],
         structs: || {
             "#pragma OPENCL EXTENSION cl_khr_int64_base_atomics : enable\n\
@@ -422,6 +434,7 @@ fn parse(parameters: &Value, at: &str, store: &Store) -> Result<Arc<dyn Field>> 
             }
         }
     }
+    attenuation::check(&p, &geometry, tracking, at)?;
     let [least, greatest] = geometry.extinction_range_per_mm();
     let ends = [&p.boundary.x, &p.boundary.y, &p.boundary.z];
     if greatest == 0.0

@@ -5,6 +5,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::Parameters;
+use super::attenuation::Attenuation;
 use super::medium::{Medium, Phase};
 use crate::error::{Error, Result};
 use crate::volume::{Store, Volume, builtin};
@@ -47,6 +48,8 @@ pub struct Layer {
     /// How a collision turns a photon.
     #[serde(default)]
     phase: Phase,
+    /// Of gamma photons: attenuation by energy.
+    attenuation: Option<Attenuation>,
 }
 
 fn absorption() -> f64 {
@@ -68,7 +71,13 @@ fn thickness_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
 impl Layer {
     fn medium(&self) -> Medium {
         let (mu_a_per_mm, mu_s_per_mm) = (self.mu_a_per_mm, self.mu_s_per_mm);
-        Medium { mu_a_per_mm, mu_s_per_mm, index: self.index, phase: self.phase.clone() }
+        Medium {
+            mu_a_per_mm,
+            mu_s_per_mm,
+            index: self.index,
+            phase: self.phase.clone(),
+            attenuation: self.attenuation.clone(),
+        }
     }
 }
 
@@ -283,9 +292,20 @@ impl Geometry {
                 );
             }
         }
-        let medium = Medium { mu_a_per_mm: 1.0 - albedo, mu_s_per_mm: albedo, index: 1.0, phase: Phase::default() };
+        let medium = Medium {
+            mu_a_per_mm: 1.0 - albedo,
+            mu_s_per_mm: albedo,
+            index: 1.0,
+            phase: Phase::default(),
+            attenuation: None,
+        };
         let size_mm = p.size_mm.unwrap_or([1.0; 3]);
         Self { place: Where::Density(density), media: vec![medium], size_mm, dims, chamber: true }
+    }
+
+    /// Whether its photons are gammas.
+    pub fn is_gamma(&self) -> bool {
+        self.media.iter().any(|m| m.phase.kind == "klein_nishina")
     }
 
     /// Whether refractive indices differ within it.

@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::attenuation::Attenuation;
 use crate::error::{Error, Result};
 
 /// Numbers of a medium in the kernel's table: `MEDIUM_FLOATS` of `kernels/shared/phase.h`.
@@ -23,6 +24,8 @@ pub struct Medium {
     pub index: f64,
     /// How a collision turns a photon.
     pub phase: Phase,
+    /// Of gamma photons, in place of absorption and scattering: attenuation by energy, with the phase `klein_nishina`.
+    pub attenuation: Option<Attenuation>,
 }
 
 /// A phase function. Which of the parameters count is said by `type`.
@@ -30,9 +33,10 @@ pub struct Medium {
 #[serde(deny_unknown_fields, default)]
 pub struct Phase {
     /// `isotropic`; `henyey_greenstein` of mean cosine `g`; `two_term_henyey_greenstein`: `weight` of a lobe `g1`, the rest of a lobe
-    /// `g2`; `rayleigh`; `tabulated`: a density over the cosine, linear between its points.
+    /// `g2`; `rayleigh`; `tabulated`: a density over the cosine, linear between its points;
+    /// `klein_nishina`: Compton scattering of gamma photons, with its loss of energy.
     #[serde(rename = "type")]
-    #[schemars(extend("enum" = ["isotropic", "henyey_greenstein", "two_term_henyey_greenstein", "rayleigh", "tabulated"]))]
+    #[schemars(extend("enum" = ["isotropic", "henyey_greenstein", "two_term_henyey_greenstein", "rayleigh", "tabulated", "klein_nishina"]))]
     pub kind: String,
     /// Mean cosine of `henyey_greenstein`.
     #[schemars(range(min = -1, max = 1))]
@@ -56,7 +60,7 @@ pub struct Phase {
 
 impl Default for Medium {
     fn default() -> Self {
-        Self { mu_a_per_mm: 0.005, mu_s_per_mm: 1.0, index: 1.37, phase: Phase::default() }
+        Self { mu_a_per_mm: 0.005, mu_s_per_mm: 1.0, index: 1.37, phase: Phase::default(), attenuation: None }
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use super::attenuation::{self, LEAST_KEV, ROWS};
 use super::geometry::{Geometry, Where};
 use super::tracking::{Tracking, majorants};
 use super::{LEDGER_BINS, Parameters, PhotonTransport, Simulation, TECHNIQUE, medium};
@@ -13,12 +14,15 @@ const LIGHT_MM_PER_NS: f64 = 299.792_458;
 /// What stands for no end.
 const ENDLESS_MM: f32 = 1e30;
 
-type Features = [(&'static str, i32); 2];
+type Features = [(&'static str, i32); 3];
 
 /// Every geometry with every tracker; the first is the chamber's, the second the homogeneous box.
-pub(super) static FEATURES: [Features; 16] = {
+pub(super) static FEATURES: [Features; 20] = {
     const fn of(geometry: i32, tracking: i32) -> Features {
-        [("GEOMETRY", geometry), ("TRACKING", tracking)]
+        [("GEOMETRY", geometry), ("TRACKING", tracking), ("GAMMA", 0)]
+    }
+    const fn gamma(geometry: i32) -> Features {
+        [("GEOMETRY", geometry), ("TRACKING", 0), ("GAMMA", 1)]
     }
     [
         of(3, 0),
@@ -37,6 +41,10 @@ pub(super) static FEATURES: [Features; 16] = {
         of(1, 3),
         of(2, 3),
         of(3, 3),
+        gamma(0),
+        gamma(1),
+        gamma(2),
+        gamma(3),
     ]
 };
 
@@ -47,7 +55,7 @@ fn features(geometry: &Geometry, tracking: Tracking) -> &'static Features {
         Where::Labels(_) => 2,
         Where::Density(_) => 3,
     };
-    let wanted = [("GEOMETRY", place), ("TRACKING", tracking as i32)];
+    let wanted = [("GEOMETRY", place), ("TRACKING", tracking as i32), ("GAMMA", geometry.is_gamma().into())];
     FEATURES.iter().find(|f| **f == wanted).unwrap_or(&FEATURES[0])
 }
 
@@ -168,6 +176,14 @@ impl Simulation {
             }
             Where::Labels(labels) => device.at_voxels = append(&mut table, labels.iter().map(|l| f32::from(*l))),
             Where::Density(density) => device.at_voxels = append(&mut table, density.iter().copied()),
+        }
+        if g.is_gamma() {
+            let source_kev = p.source.energy_kev();
+            device.source_kev = source_kev as f32;
+            device.gamma_least_kev = LEAST_KEV as f32;
+            device.gamma_least_log2 = LEAST_KEV.log2() as f32;
+            device.gamma_rows_per_log2 = ((ROWS - 1) as f64 / (source_kev / LEAST_KEV).log2().max(1e-6)) as f32;
+            device.at_gamma = append(&mut table, attenuation::rows(&g.media, source_kev));
         }
         device.most_steps = self.most_steps(device.walls);
         let mut bins = 0;

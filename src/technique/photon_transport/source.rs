@@ -27,6 +27,9 @@ pub struct LightSource {
     /// Radius of `disk` and `diffuse`. Default: 0 for `diffuse`, a quarter of the box's smaller side for `disk`.
     #[schemars(range(min = 0, max = 1e6))]
     radius_mm: Option<f64>,
+    /// Energy of gamma photons, for media whose phase is `klein_nishina`. Default 140.
+    #[schemars(range(min = 10, max = 2000))]
+    pub energy_kev: Option<f64>,
     /// An edge of `planar`. Default: the box's side along x.
     edge_u_mm: Option<[f64; 3]>,
     /// The other. Default: the box's side along y.
@@ -50,6 +53,11 @@ pub struct Source {
 const KINDS: [&str; 6] = ["pencil", "isotropic", "planar", "disk", "cone", "diffuse"];
 
 impl LightSource {
+    /// Energy of its gamma photons.
+    pub fn energy_kev(&self) -> f64 {
+        self.energy_kev.unwrap_or(140.0)
+    }
+
     /// The source in a box of a size.
     ///
     /// # Errors
