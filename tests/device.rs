@@ -140,6 +140,19 @@ const VIEW: &str = r#"{"technique": "emission_absorption", "volume": {"builtin":
 const FIELD: &str = r#"{"technique": "emission_absorption", "volume": {"photon_transport": {"photons": 70, "grid": [6, 5, 4]}},
     "image": {"width": 5, "height": 4}, "budget": {"samples": 1}}"#;
 
+/// Layers that refract, with a table, a histogram and the gather; delta tracking of a density by track length; gammas.
+const REFRACTION: &str = r#"{"technique": "emission_absorption", "volume": {"photon_transport": {"photons": 40, "grid": [3, 3, 4], "size_mm": [2, 2, 2],
+    "layers": [{"thickness_mm": 0.5, "index": 1.2, "phase": {"type": "tabulated", "cosines": [-1, 0, 1], "densities": [1, 0, 2]}},
+    {"thickness_mm": "infinite", "mu_a_per_mm": 1, "index": 1.5, "phase": {"type": "rayleigh"}}], "boundary": {"fresnel": true},
+    "exit_histogram": {"radius_edges_mm": [0, 1, 5], "angle_edges_deg": [0, 45, 90]}, "tally": "radiance_gather"}},
+    "image": {"width": 5, "height": 4}, "budget": {"samples": 1}}"#;
+const DELTA: &str = r#"{"technique": "emission_absorption", "volume": {"photon_transport": {"photons": 30, "density": {"builtin": "gaussian", "resolution": 9},
+    "medium": {"mu_a_per_mm": 1, "mu_s_per_mm": 2}, "tracking": "delta", "estimator": "track_length", "boundary": {"x": "cyclic", "y": "mirror"}}},
+    "image": {"width": 5, "height": 4}, "budget": {"samples": 1}}"#;
+const GAMMAS: &str = r#"{"technique": "emission_absorption", "volume": {"photon_transport": {"photons": 30, "grid": [3, 2, 4], "size_mm": [50, 50, 50],
+    "medium": {"phase": {"type": "klein_nishina"}, "attenuation": {"material": "water"}}, "source": {"type": "disk"}}},
+    "image": {"width": 5, "height": 4}, "budget": {"samples": 1}}"#;
+
 const PROJECTION: &str = r#"{"technique": "projection", "volume": {"builtin": "sphere", "resolution": 12},
     "image": {"width": 9, "height": 7}, "budget": {"samples": 2}, "projection": {}}"#;
 const WALK: &str = r#"{"technique": "projection", "volume": {"builtin": "sphere", "resolution": 8},
@@ -154,7 +167,7 @@ const LAYERS: &str = r#"{"technique": "isosurface", "volume": {"builtin": "gauss
 #[test]
 fn a_tiny_case_of_each_kernel_is_clean_under_oclgrind() {
     for lanes in ["1", "4"] {
-        for scene in [VIEW, FIELD, PROJECTION, WALK, SLICE, ISOSURFACE, LAYERS] {
+        for scene in [VIEW, FIELD, REFRACTION, DELTA, GAMMAS, PROJECTION, WALK, SLICE, ISOSURFACE, LAYERS] {
             assert_eq!(oclgrind(scene, lanes, None).trim(), "", "{lanes} lanes: {scene}");
         }
     }

@@ -16,6 +16,8 @@ mod oracle;
 mod phases;
 #[path = "photon_transport/published.rs"]
 mod published;
+#[path = "photon_transport/random.rs"]
+mod random;
 #[path = "photon_transport/run.rs"]
 mod run;
 #[path = "photon_transport/trackers.rs"]
