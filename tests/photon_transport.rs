@@ -20,6 +20,8 @@ mod published;
 mod random;
 #[path = "photon_transport/run.rs"]
 mod run;
+#[path = "photon_transport/threads.rs"]
+mod threads;
 #[path = "photon_transport/trackers.rs"]
 mod trackers;
 #[path = "photon_transport/truth.rs"]

@@ -143,6 +143,8 @@ impl Live {
             progress.reasons.extend_from_slice(&view.plan().reasons);
             progress.counts.non_finite_voxels = volume.non_finite();
             progress.warnings = warnings(&volume, scene);
+            let simulated = self.result.as_ref().and_then(|r| r["warnings"].as_array());
+            progress.warnings.extend(simulated.into_iter().flatten().cloned());
             if self.field.is_some() {
                 progress.field = Some(volume.clone());
             }

@@ -420,7 +420,6 @@ fn parse(parameters: &Value, at: &str, store: &Store) -> Result<Arc<dyn Field>> 
     let p: Parameters = request::parse(parameters, &(TECHNIQUE.schema)(), at)?;
     let geometry = Geometry::new(&p, store, at)?;
     let source = p.source.resolve(geometry.size_mm, geometry.chamber, &format!("{at}/source"))?;
-    let (tracking, tracking_reason) = tracking::choose(&p, &geometry, at)?;
     if let Some(histogram) = &p.exit_histogram {
         for (name, edges) in
             [("radius_edges_mm", &histogram.radius_edges_mm), ("angle_edges_deg", &histogram.angle_edges_deg)]
@@ -434,7 +433,6 @@ fn parse(parameters: &Value, at: &str, store: &Store) -> Result<Arc<dyn Field>> 
             }
         }
     }
-    attenuation::check(&p, &geometry, tracking, at)?;
     let [least, greatest] = geometry.extinction_range_per_mm();
     let ends = [&p.boundary.x, &p.boundary.y, &p.boundary.z];
     if greatest == 0.0
@@ -454,6 +452,8 @@ fn parse(parameters: &Value, at: &str, store: &Store) -> Result<Arc<dyn Field>> 
         None if p.tally == "fluence" && free => (true, "collisions are rare or missing somewhere"),
         None => (false, "photons collide everywhere"),
     };
+    let (tracking, tracking_reason) = tracking::choose(&p, &geometry, track, at)?;
+    attenuation::check(&p, &geometry, tracking, at)?;
     if p.tally == "radiance_gather" && track {
         let permitted = "collision, or leave it out";
         return Err(Error::invalid(format!("{at}/estimator"), "the gather scores collisions", permitted));

@@ -19,6 +19,10 @@ fn the_march_is_as_wrong_as_theory_says() {
         let truth = step / -(-step).exp_m1();
         judge(&format!("step {step}"), &scene, truth, 1e-7, |r| r["mean_path_mm"].as_f64().unwrap());
     }
+    let job = House::shared().finish(&request(&free_paths("march", &json!({"march_step_mm": 0.5, "photons": 1000}))));
+    let warned = job.resource()["warnings"].as_array().unwrap().iter().find(|w| w["code"] == "march_bias").cloned();
+    let measured = warned.and_then(|w| w["measured"].as_f64()).unwrap_or(0.0);
+    assert!((measured - (0.5 / -(-0.5f64).exp_m1() - 1.0)).abs() < 1e-9, "the reply says {measured}");
     for tracking in ["exact", "delta", "weighted"] {
         judge(tracking, &free_paths(tracking, &json!({})), 1.0, 1e-7, |r| r["mean_path_mm"].as_f64().unwrap());
     }

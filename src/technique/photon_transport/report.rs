@@ -61,18 +61,24 @@ impl Simulation {
         let overflow = (0..LEDGER_BINS).any(|e| ledgers.sum(e).abs() > OVERFLOW)
             || grid.iter().any(|v| (*v as i64).abs() > OVERFLOW);
         let mut warnings = Vec::new();
-        let mut warn = |code: &str, count: i64, message: &str| {
-            if count > 0 {
-                warnings.push(json!({"code": code, "message": message, "measured": count, "bound": 0}));
+        let mut warn = |code: &str, measured: f64, message: &str| {
+            if measured > 0.0 {
+                warnings.push(json!({"code": code, "message": message, "measured": measured, "bound": 0}));
             }
         };
-        warn("broken_majorant", ledgers.sum(BROKEN), self.broken_words());
+        warn("broken_majorant", ledgers.sum(BROKEN) as f64, self.broken_words());
         warn(
             "photon_faults",
-            ledgers.sum(FAULTS),
-            "photons took too many steps, or their weight was not finite; their weight is in lost",
+            ledgers.sum(FAULTS) as f64,
+            "photons took too many steps, as where nothing lets them out, or their weight was not finite: their weight is in lost",
         );
-        warn("sums_overflow", i64::from(overflow), "the 64-bit sums are about to overflow: ask for fewer photons");
+        warn("sums_overflow", f64::from(overflow), "the 64-bit sums are about to overflow: ask for fewer photons");
+        warn("beam_misses", ledgers.sum(MISSED) as f64, "photons flew past the box: their weight is in lost");
+        warn(
+            "march_bias",
+            self.march_bias(),
+            "the march's free paths are whole steps: where the medium is densest they are too long by this part",
+        );
         let mut result = json!({
             "photons": ledgers.histories,
             "ledger": fractions,
@@ -99,6 +105,13 @@ impl Simulation {
                 "minus_z": side(0), "plus_z": side(1)});
         }
         result
+    }
+
+    /// By what part the march's mean free path is too long: h / (1 - exp(-h)) - 1 for a step of optical depth h.
+    fn march_bias(&self) -> f64 {
+        let depth = self.march_step_mm() * self.geometry.extinction_range_per_mm()[1];
+        let marches = self.tracking == super::tracking::Tracking::March && depth > 0.0;
+        if marches { depth / -(-depth).exp_m1() - 1.0 } else { 0.0 }
     }
 
     fn broken_words(&self) -> &'static str {

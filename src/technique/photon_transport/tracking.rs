@@ -1,7 +1,7 @@
 //! How free paths are found, and why.
 
 use super::Parameters;
-use super::geometry::{Geometry, Where};
+use super::geometry::Geometry;
 use crate::error::{Error, Result};
 
 /// A tracker of `kernels/shared/medium.h`.
@@ -28,21 +28,13 @@ impl Tracking {
 ///
 /// # Errors
 /// A tracker that cannot see the interfaces of the scene.
-pub fn choose(p: &Parameters, geometry: &Geometry, at: &str) -> Result<(Tracking, String)> {
+pub fn choose(p: &Parameters, geometry: &Geometry, track: bool, at: &str) -> Result<(Tracking, String)> {
     let tracking = match p.tracking.as_str() {
         "exact" => Tracking::Exact,
         "march" => Tracking::March,
         "delta" => Tracking::Delta,
         "weighted" => Tracking::Weighted,
-        _ => {
-            let why = match geometry.place {
-                Where::Box => "exact: the box is homogeneous, so a free path is a closed form",
-                Where::Layers(_) => "exact: in a layer a free path is a closed form",
-                Where::Labels(_) => "exact: from voxel to voxel, no majorant and no bias",
-                Where::Density(_) => "exact: from voxel to voxel, no majorant and no bias",
-            };
-            return Ok((Tracking::Exact, why.into()));
-        }
+        _ => return Ok(cheapest(p, geometry, track)),
     };
     if tracking != Tracking::Exact && geometry.bends() {
         let detail = format!("{} tracking does not see where the refractive index changes", tracking.name());
@@ -53,6 +45,38 @@ pub fn choose(p: &Parameters, geometry: &Geometry, at: &str) -> Result<(Tracking
         _ => "as asked",
     };
     Ok((tracking, format!("{}: {why}", tracking.name())))
+}
+
+/// How many walls of voxels a photon meets in a voxel's side, on average over directions.
+const WALLS_PER_VOXEL: f64 = 1.5;
+/// Delta tracking is taken where it looks up less than this part of what voxels would.
+const CLEARLY_LESS: f64 = 0.7;
+
+/// The cheapest tracker that is unbiased for the scene. Tracks are shared out among the voxels in any case, so that only where
+/// collisions are scored can voxels be left out.
+fn cheapest(p: &Parameters, geometry: &Geometry, track: bool) -> (Tracking, String) {
+    let exact = |why: &str| (Tracking::Exact, format!("exact: {why}"));
+    let Some(voxels) = geometry.voxel_extinction_per_mm() else {
+        return exact("from face to face a free path is a closed form");
+    };
+    if geometry.is_gamma() {
+        return exact("the extinction changes with the energy, so no majorant holds");
+    }
+    if geometry.bends() {
+        return exact("from voxel to voxel, for light is bent between them");
+    }
+    if track {
+        return exact("from voxel to voxel, where tracks are scored as well");
+    }
+    let mean = |v: &[f32]| v.iter().map(|e| f64::from(*e)).sum::<f64>() / v.len() as f64;
+    let voxel_mm = (0..3).map(|a| geometry.size_mm[a] / geometry.dims[a] as f64).sum::<f64>() / 3.0;
+    let (by_voxels, by_majorants) = (WALLS_PER_VOXEL / voxel_mm + mean(&voxels), mean(&majorants(p, geometry).per_mm));
+    let numbers = format!("{by_majorants:.3} tentative collisions a mm for {by_voxels:.3} voxels and collisions");
+    if by_majorants < CLEARLY_LESS * by_voxels && p.majorant.scale >= 1.0 {
+        (Tracking::Delta, format!("delta: {numbers}"))
+    } else {
+        exact(&format!("from voxel to voxel: delta tracking would make {numbers}"))
+    }
 }
 
 /// Voxels along a block's side.
