@@ -61,7 +61,7 @@ static inline void deposit_track(constant const PhotonTransport *params, global 
             if (params->tally == TALLY_ABSORBED_TRACK) {
                 Cell c = cell_at(params, table, middle);
                 Int medium = medium_of(params, table, c, middle);
-                amount *= extinction_at(params, table, medium, c, middle) * (1.0f - medium_number(table, medium, 1));
+                amount *= extinction_at(params, table, medium, c, middle) * (1.0f - medium_number(params, table, medium, 1));
             }
             grid_add(grid, voxel, amount, inside);
         }
@@ -113,8 +113,8 @@ static inline Mask cross_wall(constant const FieldPass *pass, constant const Pho
         if (axis == 0) ahead.x = inside;
         if (axis == 1) ahead.y = inside;
         if (axis == 2) ahead.z = inside;
-        Real before = medium_number(table, medium_of(params, table, photon->cell, photon->p), 2);
-        Real after = select(medium_number(table, medium_of(params, table, ahead, photon->p), 2), (Real)(params->outside_index), out);
+        Real before = index_of(params, table, medium_of(params, table, photon->cell, photon->p));
+        Real after = select(index_of(params, table, medium_of(params, table, ahead, photon->p)), (Real)(params->outside_index), out);
         Mask bends = in & ~back & MASK(before != after) & (params->fresnel ? (Mask)(-1) : ~out);
         if (any_lane(bends)) {
             Real eta = before / after, cos_out, reflected = fresnel(fabs(d), eta, &cos_out);
@@ -146,7 +146,7 @@ static inline Mask collide(constant const FieldPass *pass, constant const Photon
     UInt4Lanes r = draw(pass, photon, item_first, 0);
     photon->depth = select(photon->depth, -log(unit_open(r.c)), hit);
     Mask real = hit;
-    Medium m = medium_all(table, medium);
+    Medium m = medium_all(params, table, medium);
     Real sigma = rate;
 #if GAMMA
     m.albedo = attenuation_at(params, table, medium, photon->energy).albedo;
@@ -287,7 +287,7 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
 #endif
         Mask late = (Mask)(0);
         if (params->gate_mm < 1e30f) {
-            Real index = medium_number(table, medium, 2), room = fmax((params->gate_mm - photon.optical) / index, (Real)(0.0f));
+            Real index = index_of(params, table, medium), room = fmax((params->gate_mm - photon.optical) / index, (Real)(0.0f));
             late = alive & MASK(t > room);
             t = fmin(t, room);
             photon.optical = mad(index, t, photon.optical);
@@ -296,7 +296,7 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
         if (params->tally == TALLY_FLUENCE_TRACK || params->tally == TALLY_ABSORBED_TRACK) {
 #if VOXEL_WALLS
             Real amount = photon.weight * t * params->deposit_scale;
-            if (params->tally == TALLY_ABSORBED_TRACK) amount *= rate * (1.0f - medium_number(table, medium, 1));
+            if (params->tally == TALLY_ABSORBED_TRACK) amount *= rate * (1.0f - medium_number(params, table, medium, 1));
             grid_add(own, cell_voxel(params, photon.cell), amount, alive);
 #else
             deposit_track(params, table, own, photon.p, photon.d, t, photon.weight, alive);

@@ -91,26 +91,34 @@ static inline Int medium_of(constant const PhotonTransport *params, global const
 #endif
 }
 
-// One number of a medium.
-static inline Real medium_number(global const float *table, Int medium, int number) {
+// One number of a medium. The table has a number of all media, then the next; up to 16 of them fit in a register.
+static inline Real medium_number(constant const PhotonTransport *params, global const float *table, Int medium, int number) {
 #if GEOMETRY == BOX || GEOMETRY == DENSITY
-    return (Real)(table[number]);
+    return (Real)(table[number * params->media]);
 #else
-    return gather_reals(table + number, medium * MEDIUM_FLOATS);
+#if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_permvarsf512)
+    if (params->media == 16) return __builtin_ia32_permvarsf512(vload16(number, table), medium);
+#endif
+    return gather_reals(table + number * params->media, medium);
 #endif
 }
 
-static inline Medium medium_all(global const float *table, Int medium) {
+// The refractive index there.
+static inline Real index_of(constant const PhotonTransport *params, global const float *table, Int medium) {
+    return params->mismatch ? medium_number(params, table, medium, 2) : (Real)(params->index);
+}
+
+static inline Medium medium_all(constant const PhotonTransport *params, global const float *table, Int medium) {
     Medium m;
-    m.extinction = medium_number(table, medium, 0), m.albedo = medium_number(table, medium, 1);
-    m.index = medium_number(table, medium, 2), m.kind = to_int(medium_number(table, medium, 3));
-    m.a = medium_number(table, medium, 4), m.b = medium_number(table, medium, 5), m.c = medium_number(table, medium, 6);
+    m.extinction = medium_number(params, table, medium, 0), m.albedo = medium_number(params, table, medium, 1);
+    m.kind = to_int(medium_number(params, table, medium, 3));
+    m.a = medium_number(params, table, medium, 4), m.b = medium_number(params, table, medium, 5), m.c = medium_number(params, table, medium, 6);
     return m;
 }
 
 // The extinction there, per mm.
 static inline Real extinction_at(constant const PhotonTransport *params, global const float *table, Int medium, Cell c, Real3 p) {
-    Real extinction = medium_number(table, medium, 0);
+    Real extinction = medium_number(params, table, medium, 0);
 #if GEOMETRY == DENSITY
     Int voxel = VOXEL_WALLS ? cell_voxel(params, c) : voxel_at(params, p);
     extinction *= gather_reals(table + params->at_voxels, voxel);

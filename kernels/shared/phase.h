@@ -1,14 +1,13 @@
-// Phase functions: how a collision turns a direction. A medium is MEDIUM_FLOATS numbers in the table:
+// Phase functions: how a collision turns a direction. A medium is eight numbers in the table:
 //   extinction per mm, albedo, refractive index, kind, then two or three parameters of the kind
 //   PHASE_LOBES      g1, g2, weight of g1: two Henyey-Greenstein lobes (one: weight 1; isotropic: g1 = 0)
 //   PHASE_RAYLEIGH   none
 //   PHASE_TABLE      where its rows start in the table, their number: rows (cosine, density, cumulative), linear between them
-#define MEDIUM_FLOATS 8
 #define PHASE_LOBES 0
 #define PHASE_RAYLEIGH 1
 #define PHASE_TABLE 2
 
-typedef struct { Real extinction, albedo, index; Int kind; Real a, b, c; } Medium;
+typedef struct { Real extinction, albedo; Int kind; Real a, b, c; } Medium;
 
 // sin and cos of a turn's fraction v in [0, 1]: polynomials in a quarter turn, to 2e-7.
 static inline void turn(Real v, Real *sine, Real *cosine) {

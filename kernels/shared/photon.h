@@ -87,7 +87,7 @@ static inline void enter(constant const PhotonTransport *params, global const fl
     #undef AXIS
     photon->cell = cell_at(params, table, photon->p);
     if (!params->fresnel || params->source_type == SOURCE_ISOTROPIC || !any_lane(outside)) return;
-    Real index = medium_number(table, medium_of(params, table, photon->cell, photon->p), 2), eta = params->outside_index / index, cos_out;
+    Real index = index_of(params, table, medium_of(params, table, photon->cell, photon->p)), eta = params->outside_index / index, cos_out;
     Real reflected = fresnel(cos_in, eta, &cos_out);
     reflected = select((Real)(0.0f), reflected, outside & MASK(eta != 1.0f));
     if (params->specular_entry) {

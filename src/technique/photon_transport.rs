@@ -117,6 +117,10 @@ device_struct! {
         pub wall_mm: [f32; 3],
         /// Walls per mm; 0 where there is but one cell.
         pub walls_per_mm: [f32; 3],
+        /// Media that the table has room for.
+        pub media: i32,
+        /// The refractive index, where there is but one.
+        pub index: f32,
         /// Layers.
         pub layers: i32,
         /// Ends of the layers, from 0 on.

@@ -6,8 +6,8 @@ use serde::Deserialize;
 use super::attenuation::Attenuation;
 use crate::error::{Error, Result};
 
-/// Numbers of a medium in the kernel's table: `MEDIUM_FLOATS` of `kernels/shared/phase.h`.
-pub const MEDIUM_FLOATS: usize = 8;
+/// Numbers of a medium in the kernel's table.
+const NUMBERS: usize = 8;
 
 /// A homogeneous medium.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
@@ -139,14 +139,22 @@ impl Phase {
     }
 }
 
-/// The kernel's table of media, with the rows of tabulated phase functions behind it.
-pub fn table(media: &[&Medium]) -> Vec<f32> {
+/// How many media the kernel's table has room for: up to 16 fit in a register.
+pub fn room(media: usize) -> usize {
+    media.max(16)
+}
+
+/// The kernel's table of media: a number of all of them, then the next; then the rows of tabulated phase functions.
+pub fn table(media: &[Medium]) -> Vec<f32> {
+    let room = room(media.len());
+    let mut table = vec![0.0; NUMBERS * room];
     let mut rows = Vec::new();
-    let mut table = Vec::new();
-    for medium in media {
-        let [kind, a, b, c] = medium.phase.numbers(&mut rows, media.len() * MEDIUM_FLOATS);
+    for (i, medium) in media.iter().enumerate() {
+        let [kind, a, b, c] = medium.phase.numbers(&mut rows, NUMBERS * room);
         let (extinction, albedo) = (medium.extinction_per_mm() as f32, medium.albedo() as f32);
-        table.extend([extinction, albedo, medium.index as f32, kind, a, b, c, 0.0]);
+        for (number, value) in [extinction, albedo, medium.index as f32, kind, a, b, c].into_iter().enumerate() {
+            table[number * room + i] = value;
+        }
     }
     table.extend(rows);
     table

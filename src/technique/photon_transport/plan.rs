@@ -142,8 +142,7 @@ impl Simulation {
 
     pub(super) fn device_plan(&self) -> FieldPlan {
         let (p, g) = (&self.parameters, &self.geometry);
-        let media: Vec<_> = g.media.iter().collect();
-        let mut table = medium::table(&media);
+        let mut table = medium::table(&g.media);
         let spacing = self.spacing_mm();
         let mut device = PhotonTransport {
             grid: g.dims.map(|n| n as i32),
@@ -152,6 +151,8 @@ impl Simulation {
             outside_index: p.boundary.outside_index as f32,
             fresnel: p.boundary.fresnel.into(),
             specular_entry: p.boundary.specular_entry.into(),
+            media: medium::room(g.media.len()) as i32,
+            index: g.media[0].index as f32,
             mismatch: g.bends().into(),
             gate_mm: p.time_gate_ns.map_or(ENDLESS_MM, |ns| (ns * LIGHT_MM_PER_NS) as f32),
             march_step_mm: self.march_step_mm() as f32,
