@@ -9,9 +9,9 @@ use std::f64::consts::PI;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::Parameters;
 use super::geometry::{Geometry, Where};
 use super::medium::Medium;
+use super::parameters::Parameters;
 use super::tracking::Tracking;
 use crate::error::{Error, Result};
 

@@ -2,11 +2,11 @@
 
 use schemars::JsonSchema;
 use serde::Deserialize;
-use serde_json::{Value, json};
+use serde_json::json;
 
-use super::Parameters;
-use super::attenuation::Attenuation;
+use super::layers::{self, Layer};
 use super::medium::{Medium, Phase};
+use super::parameters::Parameters;
 use crate::error::{Error, Result};
 use crate::volume::{Store, Volume, builtin};
 
@@ -24,61 +24,6 @@ pub struct GridRequest {
     /// Seed of a built-in volume that is made of random numbers.
     #[schemars(range(min = 0, max = 9_007_199_254_740_991u64))]
     seed: Option<u64>,
-}
-
-/// A layer along z.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Layer {
-    /// Its thickness; the last may be `"infinite"`.
-    #[schemars(schema_with = "thickness_schema")]
-    thickness_mm: Value,
-    /// Absorption coefficient.
-    #[schemars(range(min = 0, max = 1e6))]
-    #[serde(default = "absorption")]
-    mu_a_per_mm: f64,
-    /// Scattering coefficient.
-    #[schemars(range(min = 0, max = 1e6))]
-    #[serde(default = "scattering")]
-    mu_s_per_mm: f64,
-    /// Refractive index.
-    #[schemars(range(min = 1, max = 4))]
-    #[serde(default = "index")]
-    index: f64,
-    /// How a collision turns a photon.
-    #[serde(default)]
-    phase: Phase,
-    /// Of gamma photons: attenuation by energy.
-    attenuation: Option<Attenuation>,
-}
-
-fn absorption() -> f64 {
-    Medium::default().mu_a_per_mm
-}
-
-fn scattering() -> f64 {
-    Medium::default().mu_s_per_mm
-}
-
-fn index() -> f64 {
-    Medium::default().index
-}
-
-fn thickness_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
-    schemars::json_schema!({"description": "Its thickness in mm, more than 0; the last may be \"infinite\".", "type": ["number", "string"]})
-}
-
-impl Layer {
-    fn medium(&self) -> Medium {
-        let (mu_a_per_mm, mu_s_per_mm) = (self.mu_a_per_mm, self.mu_s_per_mm);
-        Medium {
-            mu_a_per_mm,
-            mu_s_per_mm,
-            index: self.index,
-            phase: self.phase.clone(),
-            attenuation: self.attenuation.clone(),
-        }
-    }
 }
 
 /// What is where.
@@ -197,26 +142,8 @@ impl Geometry {
     }
 
     fn layers(p: &Parameters, layers: &[Layer], at: &str) -> Result<Self> {
-        let mut ends = Vec::new();
-        let mut depth = 0.0;
-        for (i, layer) in layers.iter().enumerate() {
-            let pointer = || format!("{at}/layers/{i}/thickness_mm");
-            depth += match &layer.thickness_mm {
-                Value::String(word) if word == "infinite" && i + 1 == layers.len() => f64::INFINITY,
-                Value::Number(n) => n
-                    .as_f64()
-                    .filter(|t| (1e-6..=1e6).contains(t))
-                    .ok_or_else(|| Error::invalid(pointer(), "not a thickness", "0.000001 to 1000000"))?,
-                _ => {
-                    return Err(Error::invalid(
-                        pointer(),
-                        "not a thickness",
-                        "a number of mm; the last may be \"infinite\"",
-                    ));
-                }
-            };
-            ends.push(depth);
-        }
+        let ends = layers::ends(layers, &format!("{at}/layers"))?;
+        let depth = ends.last().copied().unwrap_or(0.0);
         let mut size_mm = p.size_mm.unwrap_or([60.0; 3]);
         let finite = ends.iter().rev().find(|e| e.is_finite()).copied().unwrap_or(0.0);
         if depth.is_finite() {

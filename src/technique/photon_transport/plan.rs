@@ -4,8 +4,9 @@ use std::f64::consts::PI;
 
 use super::attenuation::{self, LEAST_KEV, ROWS};
 use super::geometry::{Geometry, Where};
+use super::parameters::Parameters;
 use super::tracking::{Tracking, majorants};
-use super::{LEDGER_BINS, Parameters, PhotonTransport, Simulation, TECHNIQUE, medium};
+use super::{LEDGER_BINS, PhotonTransport, Simulation, TECHNIQUE, medium};
 use crate::device::program::Variant;
 use crate::technique::FieldPlan;
 

@@ -1,7 +1,7 @@
 //! How free paths are found, and why.
 
-use super::Parameters;
 use super::geometry::Geometry;
+use super::parameters::Parameters;
 use crate::error::{Error, Result};
 
 /// A tracker of `kernels/shared/medium.h`.

@@ -1,0 +1,52 @@
+// Adds what photons leave to the grid: at collisions, or along the way.
+
+typedef struct { global ulong *sums; int own; } Grid;
+
+static inline void grid_add(Grid grid, Int voxel, Real amount, Mask active) {
+    if (grid.own) tally_own(grid.sums, voxel, fixed(amount), active);
+    else tally_fixed(grid.sums, voxel, fixed(amount), active);
+}
+
+// Adds a collision's deposit to the grid.
+static inline void deposit(constant const PhotonTransport *params, Grid grid, Int voxel, Real3 p, Real amount, Mask hit) {
+    // Layers and boundaries that have no end reach further than the grid.
+    if (params->endless) {
+        hit &= MASK(p.x >= 0.0f) & MASK(p.x <= params->size_mm[0]) & MASK(p.y >= 0.0f) & MASK(p.y <= params->size_mm[1]);
+        hit &= MASK(p.z >= 0.0f) & MASK(p.z <= params->size_mm[2]);
+    }
+    grid_add(grid, voxel, amount, hit);
+}
+
+#if !VOXEL_WALLS
+// Shares a straight flight out among the voxels that it crosses: weight times length, times the absorption for absorbed energy.
+static inline void deposit_track(constant const PhotonTransport *params, global const float *table, Grid grid, Real3 p, Real3 d,
+                                 Real length, Real weight, Mask on) {
+    Real t = (Real)(0.0f);
+    // Voxels' planes by their number, so that no plane is met twice.
+    Int x = to_int(floor(p.x * params->voxels_per_mm[0])), y = to_int(floor(p.y * params->voxels_per_mm[1])), z = to_int(floor(p.z * params->voxels_per_mm[2]));
+    Int up_x = -MASK(d.x > 0.0f), up_y = -MASK(d.y > 0.0f), up_z = -MASK(d.z > 0.0f);
+    for (int i = 0; i < params->most_steps && any_lane(on); i++) {
+        Real tx = (to_real(x + up_x) * params->voxel_mm[0] - p.x) / d.x, ty = (to_real(y + up_y) * params->voxel_mm[1] - p.y) / d.y;
+        Real tz = (to_real(z + up_z) * params->voxel_mm[2] - p.z) / d.z;
+        tx = select(tx, (Real)(1e30f), MASK(fabs(d.x) < 1e-12f)), ty = select(ty, (Real)(1e30f), MASK(fabs(d.y) < 1e-12f));
+        tz = select(tz, (Real)(1e30f), MASK(fabs(d.z) < 1e-12f));
+        Real to = fmin(fmin(tx, ty), fmin(tz, length)), part = fmax(to - t, (Real)(0.0f));
+        Mask inside = on & MASK(x >= 0) & MASK(x < params->grid[0]) & MASK(y >= 0) & MASK(y < params->grid[1]) & MASK(z >= 0) & MASK(z < params->grid[2]);
+        if (any_lane(inside)) {
+            Real amount = weight * part * params->deposit_scale;
+            Real3 middle = along(p, d, t + 0.5f * part);
+            Int voxel = (z * params->grid[1] + y) * params->grid[0] + x;
+            if (params->tally == TALLY_ABSORBED_TRACK) {
+                Cell c = cell_at(params, table, middle);
+                Int medium = medium_of(params, table, c, middle);
+                amount *= extinction_at(params, table, medium, c, middle) * (1.0f - medium_number(params, table, medium, 1));
+            }
+            grid_add(grid, voxel, amount, inside);
+        }
+        Mask in_x = on & MASK(tx <= to), in_y = on & MASK(ty <= to), in_z = on & MASK(tz <= to);
+        x += select((Int)(0), up_x + up_x - 1, in_x), y += select((Int)(0), up_y + up_y - 1, in_y), z += select((Int)(0), up_z + up_z - 1, in_z);
+        t = select(t, to, on);
+        on &= MASK(to < length);
+    }
+}
+#endif
