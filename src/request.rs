@@ -227,7 +227,11 @@ fn violation(error: &jsonschema::ValidationError<'_>, schema: &Value, at: &str) 
         ValidationErrorKind::MaxItems { limit } => one("too many elements".into(), format!("at most {limit}")),
         ValidationErrorKind::Required { property } => {
             let name = property.as_str().unwrap_or_default();
-            vec![Violation::new(format!("{pointer}/{name}"), "this field is required", permitted_fields(schema, ""))]
+            vec![Violation::new(
+                format!("{pointer}/{name}"),
+                "this field is required",
+                permitted_fields(schema, error.instance_path().as_str()),
+            )]
         }
         ValidationErrorKind::Type { kind } => {
             let wanted = match kind {

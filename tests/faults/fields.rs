@@ -141,6 +141,29 @@ fn cases() -> Vec<(&'static str, Value, &'static str)> {
             json!({"photon_transport": {"roulette": {"survive": 0.5}}}),
             "/volume/photon_transport/roulette/survive",
         ),
+        (
+            "/volume",
+            json!({"photon_transport": {"layers": [{"mu_a_per_mm": 1}]}}),
+            "/volume/photon_transport/layers/0/thickness_mm",
+        ),
+        (
+            "/volume",
+            json!({"photon_transport": {"layers": [{"thickness_mm": "thick"}]}}),
+            "/volume/photon_transport/layers/0/thickness_mm",
+        ),
+        ("/volume", json!({"photon_transport": {"media": [{}]}}), "/volume/photon_transport/media"),
+        (
+            "/volume",
+            json!({"photon_transport": {"labels": {"builtin": "smoke"}, "media": [{}, {}]}}),
+            "/volume/photon_transport/labels",
+        ),
+        ("/volume", json!({"photon_transport": {"medium": {}, "albedo": 0.5}}), "/volume/photon_transport/albedo"),
+        (
+            "/volume",
+            json!({"photon_transport": {"medium": {"phase": {"type": "henyey_greenstein", "g": 1.5}}}}),
+            "/volume/photon_transport/medium/phase/g",
+        ),
+        ("/volume", json!({"photon_transport": {"medium": {"mu_a": 1}}}), "/volume/photon_transport/medium/mu_a"),
         ("/volume", json!({"photon_transport": {"colour": 1}}), "/volume/photon_transport/colour"),
     ]
 }
