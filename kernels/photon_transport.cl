@@ -229,7 +229,7 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
 #if TRACKING == MARCH
         // The lecture's march: a free path is as many whole steps as it takes to use up its optical depth.
         Real t = fmin(t_wall, (Real)(params->march_step_mm));
-        Mask at_wall = MASK(t_wall <= params->march_step_mm), hit = alive & ~at_wall & MASK(photon.depth <= rate * t);
+        Mask at_wall = MASK(t_wall <= params->march_step_mm), hit = alive & ~at_wall & MASK(photon.depth <= rate * t) & MASK(rate > 0.0f);
 #else
         Mask hit = MASK(photon.depth < rate * t_wall) & alive, at_wall = ~hit;
         Real t = select(t_wall, photon.depth / rate, hit);

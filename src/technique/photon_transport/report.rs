@@ -25,7 +25,7 @@ const BROKEN: usize = 14;
 const MISSED: usize = 15;
 const PATH: usize = 16;
 /// Sums past this may soon wrap round.
-const OVERFLOW: i64 = 1 << 61;
+const OVERFLOW: u64 = 1 << 61;
 
 /// The sums of the batches.
 pub(super) struct Ledgers<'a> {
@@ -58,8 +58,8 @@ impl Simulation {
         let n = ledgers.histories as f64;
         let fractions: Map<String, Value> =
             FRACTIONS.iter().enumerate().map(|(entry, name)| ((*name).into(), ledgers.fraction(entry))).collect();
-        let overflow = (0..LEDGER_BINS).any(|e| ledgers.sum(e).abs() > OVERFLOW)
-            || grid.iter().any(|v| (*v as i64).abs() > OVERFLOW);
+        let overflow = (0..LEDGER_BINS).any(|e| ledgers.sum(e).unsigned_abs() > OVERFLOW)
+            || grid.iter().any(|v| (*v as i64).unsigned_abs() > OVERFLOW);
         let mut warnings = Vec::new();
         let mut warn = |code: &str, measured: f64, message: &str| {
             if measured > 0.0 {
