@@ -53,6 +53,11 @@ impl Bench {
 
     /// Posts the simulation and waits for its picture, then asks for the result.
     fn run(&self, scene: &Value) -> Run {
+        self.run_with_field(scene, false).0
+    }
+
+    /// The same with the grid, where it is wanted.
+    fn run_with_field(&self, scene: &Value, wanted: bool) -> (Run, Vec<f32>) {
         let body = json!({"technique": "emission_absorption", "volume": {"photon_transport": scene},
             "image": {"width": 8, "height": 8}, "budget": {"samples": 1}});
         let started = Instant::now();
@@ -63,14 +68,17 @@ impl Bench {
             let url = format!("{}/v1/renders/{id}", self.server.url());
             self.client.get(format!("{url}/frame.png?wait=final")).send().await.unwrap().error_for_status().unwrap();
             let wall_s = started.elapsed().as_secs_f64();
+            let mut grid = Vec::new();
+            if wanted {
+                let nrrd = self.client.get(format!("{url}/field")).send().await.unwrap().bytes().await.unwrap();
+                let start = nrrd.windows(2).position(|w| w == b"\n\n").unwrap() + 2;
+                grid.extend(nrrd[start..].chunks_exact(4).map(|c| f32::from_le_bytes(c.try_into().unwrap())));
+            }
             let resource: Value = self.client.get(url).send().await.unwrap().json().await.unwrap();
             let result = resource["result"].clone();
             let photons = result["photons"].as_f64().unwrap_or_else(|| panic!("{resource}"));
-            Run {
-                photons_per_ms: result["photons_per_ms"].as_f64().unwrap(),
-                wall_per_ms: photons / wall_s / 1e3,
-                result,
-            }
+            let photons_per_ms = result["photons_per_ms"].as_f64().unwrap();
+            (Run { photons_per_ms, wall_per_ms: photons / wall_s / 1e3, result }, grid)
         })
     }
 }
@@ -182,7 +190,7 @@ fn settings(bench: &Bench) {
             let grids: Vec<Vec<f32>> = (0..fields)
                 .map(|seed| {
                     let scene = with(&with(&scene, &setting), &json!({"photons": photons, "seed": seed}));
-                    let run = bench.run_with_field(&scene);
+                    let run = bench.run_with_field(&scene, true);
                     per_photon_s.push(1e-3 / run.0.photons_per_ms);
                     run.1
                 })
@@ -215,26 +223,6 @@ const SETTINGS: [(&str, &str); 6] = [
         r#"{"tracking": "delta", "estimator": "collision", "majorant": {"grid": "global"}}"#,
     ),
 ];
-
-impl Bench {
-    /// A run with its grid.
-    fn run_with_field(&self, scene: &Value) -> (Run, Vec<f32>) {
-        let body = json!({"technique": "emission_absorption", "volume": {"photon_transport": scene}, "image": {"width": 8, "height": 8}, "budget": {"samples": 1}});
-        self.runtime.block_on(async {
-            let url = format!("{}/v1/renders", self.server.url());
-            let reply: Value = self.client.post(url).json(&body).send().await.unwrap().json().await.unwrap();
-            let id = reply["id"].as_str().unwrap_or_else(|| panic!("{reply}"));
-            let url = format!("{}/v1/renders/{id}", self.server.url());
-            self.client.get(format!("{url}/frame.png?wait=final")).send().await.unwrap().error_for_status().unwrap();
-            let nrrd = self.client.get(format!("{url}/field")).send().await.unwrap().bytes().await.unwrap();
-            let resource: Value = self.client.get(url).send().await.unwrap().json().await.unwrap();
-            let start = nrrd.windows(2).position(|w| w == b"\n\n").unwrap() + 2;
-            let grid = nrrd[start..].chunks_exact(4).map(|c| f32::from_le_bytes(c.try_into().unwrap())).collect();
-            let photons_per_ms = resource["result"]["photons_per_ms"].as_f64().unwrap();
-            (Run { photons_per_ms, wall_per_ms: 0.0, result: resource["result"].clone() }, grid)
-        })
-    }
-}
 
 fn threads() {
     println!("\n| photons/ms on cube60 | 1 thread | all threads | ratio |\n|---|---|---|---|");

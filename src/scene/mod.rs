@@ -241,12 +241,7 @@ fn subject(request: Option<&VolumeRequest>, store: &Store, limits: &Limits) -> R
         }
     }
     if let Some(id) = &request.id {
-        let volume = store.get(id).map_err(|e| match e {
-            Error::NotFound { .. } => {
-                Error::invalid("/volume/id", format!("there is no volume '{id}'"), "an id from /v1/volumes")
-            }
-            other => other,
-        })?;
+        let volume = store.named(id, "/volume/id")?;
         return Ok((Subject::Volume(volume.clone()), Framing::from(&*volume)));
     }
     if let Some(name) = &request.builtin {

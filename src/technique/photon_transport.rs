@@ -125,6 +125,8 @@ fn source() -> Source {
 struct Simulation {
     parameters: Parameters,
     geometry: Geometry,
+    /// Least and greatest anywhere: looked for once, for a grid has many voxels.
+    extinction_range_per_mm: [f64; 2],
     source: source::Source,
     tracking: Tracking,
     tracking_reason: String,
@@ -150,7 +152,8 @@ fn parse(parameters: &Value, at: &str, store: &Store) -> Result<Arc<dyn Field>> 
             }
         }
     }
-    let [least, greatest] = geometry.extinction_range_per_mm();
+    let extinction_range_per_mm = geometry.extinction_range_per_mm();
+    let [least, greatest] = extinction_range_per_mm;
     let ends = [&p.boundary.x, &p.boundary.y, &p.boundary.z];
     if greatest == 0.0
         && p.time_gate_ns.is_none()
@@ -181,7 +184,16 @@ fn parse(parameters: &Value, at: &str, store: &Store) -> Result<Arc<dyn Field>> 
         format!("photon_transport: estimator {estimator}: {why}"),
         "photon_transport: roulette in place of an energy cut-off".into(),
     ];
-    Ok(Arc::new(Simulation { parameters: p, geometry, source, tracking, tracking_reason, track, reasons }))
+    Ok(Arc::new(Simulation {
+        parameters: p,
+        geometry,
+        extinction_range_per_mm,
+        source,
+        tracking,
+        tracking_reason,
+        track,
+        reasons,
+    }))
 }
 
 impl Field for Simulation {

@@ -113,6 +113,19 @@ impl Store {
         Ok(volume)
     }
 
+    /// As [`Store::get`], where the request's field at `pointer` names the volume.
+    ///
+    /// # Errors
+    /// Those of [`Store::get`]; [`Error::Invalid`] with the pointer where there is no such volume.
+    pub fn named(&self, id: &str, pointer: &str) -> Result<Arc<Volume>> {
+        self.get(id).map_err(|e| match e {
+            Error::NotFound { .. } => {
+                Error::invalid(pointer, format!("there is no volume '{id}'"), "an id from /v1/volumes")
+            }
+            other => other,
+        })
+    }
+
     /// A built-in volume, built if it is not in memory.
     ///
     /// # Errors

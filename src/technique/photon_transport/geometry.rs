@@ -56,12 +56,7 @@ pub struct Geometry {
 
 fn volume(request: &GridRequest, store: &Store, at: &str) -> Result<std::sync::Arc<Volume>> {
     match (&request.id, &request.builtin) {
-        (Some(id), None) => store.get(id).map_err(|e| match e {
-            Error::NotFound { .. } => {
-                Error::invalid(format!("{at}/id"), format!("there is no volume '{id}'"), "an id from /v1/volumes")
-            }
-            other => other,
-        }),
+        (Some(id), None) => store.named(id, &format!("{at}/id")),
         (None, Some(name)) if builtin::NAMES.contains(&name.as_str()) => {
             store.builtin(name, request.resolution.unwrap_or(64) as usize, request.seed.unwrap_or(0))
         }

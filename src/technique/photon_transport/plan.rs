@@ -212,13 +212,13 @@ impl Simulation {
     /// In a thin box only light that total reflection keeps in takes many steps: without absorption it would never end.
     fn most_steps(&self, walls: [i32; 3]) -> i32 {
         let across: f64 = self.geometry.size_mm.iter().sum();
-        let thin = self.geometry.extinction_range_per_mm()[1] * across < 0.1;
+        let thin = self.extinction_range_per_mm[1] * across < 0.1;
         if thin { 5_000 + 100 * walls.iter().sum::<i32>() } else { 1_000_000 }
     }
 
     /// The march's step: the request's, or a tenth of the shortest mean free path.
     pub(super) fn march_step_mm(&self) -> f64 {
-        let shortest = 0.1 / self.geometry.extinction_range_per_mm()[1].max(1e-30);
+        let shortest = 0.1 / self.extinction_range_per_mm[1].max(1e-30);
         self.parameters
             .march_step_mm
             .unwrap_or(shortest.min(self.geometry.size_mm.iter().copied().fold(f64::INFINITY, f64::min)))

@@ -109,7 +109,7 @@ impl Simulation {
 
     /// By what part the march's mean free path is too long: h / (1 - exp(-h)) - 1 for a step of optical depth h.
     fn march_bias(&self) -> f64 {
-        let depth = self.march_step_mm() * self.geometry.extinction_range_per_mm()[1];
+        let depth = self.march_step_mm() * self.extinction_range_per_mm[1];
         let marches = self.tracking == super::tracking::Tracking::March && depth > 0.0;
         if marches { depth / -(-depth).exp_m1() - 1.0 } else { 0.0 }
     }
