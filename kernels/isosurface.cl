@@ -57,10 +57,7 @@ static inline Stretch stretch_of(constant const View *view, VOLUME voxels, const
 static inline Real3 surface_colour(constant const View *view, constant const Isosurface *params, VOLUME voxels, const Packet *p,
                                    const Bracket *b, Real t, Mask found, Real3 colour) {
     if (params->depth) {
-        // The eye is at -t_eye, or as far before the plane as the plane's point is away.
-        Real px = select((Real)(0.0f), p->x, (Int)(view->perspective)), py = select((Real)(0.0f), p->y, (Int)(view->perspective));
-        Real3 w = affine3(view->towards_world, view->right_world, view->down_world, px, py);
-        Real depth = t + (view->perspective ? sqrt(dot3(w, w)) : (Real)(view->t_eye));
+        Real depth = t - eye_on_ray(view, p->x, p->y);
         return real3(depth, depth, depth);
     }
     Real3 at = along(p->ray.origin, p->ray.direction, t), ray = ray_world(view, p->x, p->y);

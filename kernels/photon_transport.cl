@@ -107,14 +107,9 @@ static inline Mask collide(constant const FieldPass *pass, constant const Photon
     sigma = extinction_at(params, table, medium, photon->cell, photon->p);
     Mask broken = hit & MASK(sigma > rate * 1.000001f);
     if (any_lane(broken)) tally_fixed(ledger, (Int)(LEDGER_BROKEN), (ULong)(1), broken);
-#if TRACKING == DELTA
-    real = hit & MASK(unit_open(r.d) * rate < sigma);
-#else
-    Real null = rate - sigma, chance = sigma / (sigma + fabs(null));
-    real = hit & MASK(unit_open(r.d) < chance);
-    Real factor = select(null / (rate * (1.0f - chance)), sigma / (rate * chance), real);
+    Real factor;
+    real = real_collisions(sigma, rate, unit_open(r.d), hit, &factor);
     photon->weight = select(photon->weight, photon->weight * factor, hit);
-#endif
     if (!any_lane(real)) {
         photon->event += as_UInt(select((Int)(0), (Int)(1), hit));
         return hit;

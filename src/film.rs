@@ -181,6 +181,11 @@ impl Film {
         Some(if mean > 0.0 { rms / mean } else { rms })
     }
 
+    /// The luminance of all samples together.
+    pub fn luminance_sum(&self) -> f64 {
+        self.main.mean_luminance() * self.main.pixels() as f64 * f64::from(self.main.count)
+    }
+
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         let held = |s: &Samples| 4 * (s.mean.len() + s.m2.len());

@@ -157,6 +157,15 @@ pub fn schema_of<T: JsonSchema>() -> Value {
     value
 }
 
+/// The JSON Schema of `T` without some of its fields.
+pub fn schema_without<T: JsonSchema>(fields: &[&str]) -> Value {
+    let mut schema = schema_of::<T>();
+    if let Some(properties) = schema["properties"].as_object_mut() {
+        properties.retain(|name, _| !fields.contains(&name.as_str()));
+    }
+    schema
+}
+
 /// Checks `value` against `schema` and deserialises it. `at` is the JSON pointer of `value` in the body.
 ///
 /// # Errors

@@ -49,16 +49,22 @@ static inline void clip_plane(constant const float *plane, Ray *ray) {
     ray->t_far = select(ray->t_far, (Real)(-1e30f), along & MASK(distance < 0.0f));
 }
 
+// Where the eye is on the ray through the image point (x, y).
+static inline Real eye_on_ray(constant const View *view, Real x, Real y) {
+    if (!view->perspective) return (Real)(-view->t_eye);
+    Real3 world = affine3(view->towards_world, view->right_world, view->down_world, x, y);
+    return -sqrt(dot3(world, world));
+}
+
 // The ray through the image point (x, y) in pixels, clipped to the volume's box and the scene's clipping planes.
 static inline Ray camera_ray(constant const View *view, Real x, Real y) {
     Ray ray;
     ray.origin = affine3(view->plane, view->right, view->down, x, y);
     Real px = select((Real)(0.0f), x, (Int)(view->perspective)), py = select((Real)(0.0f), y, (Int)(view->perspective));
     Real3 world = affine3(view->towards_world, view->right_world, view->down_world, px, py);
-    Real length = sqrt(dot3(world, world));
     Real3 towards = affine3(view->towards, view->right, view->down, px, py);
-    ray.direction = scale3(towards, 1.0f / length);
-    ray.t_near = view->perspective ? -length : (Real)(-view->t_eye);
+    ray.direction = scale3(towards, 1.0f / sqrt(dot3(world, world)));
+    ray.t_near = eye_on_ray(view, x, y);
     ray.t_far = (Real)(1e30f);
     clip_box(view, 0.0f, &ray);
     for (int i = 0; i < view->planes; i++) clip_plane(view->plane_index + 4 * i, &ray);

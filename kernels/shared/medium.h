@@ -1,32 +1,17 @@
-// What a photon flies through: a box of media, cut by walls at which it must look again. GEOMETRY says where a medium is,
+// What a photon flies through: a box of media, cut by walls (walls.h). GEOMETRY says where a medium is,
 //   BOX      one everywhere               LABELS   one per voxel, by its number
 //   LAYERS   one per layer along z        DENSITY  one whose extinction is times a voxel's density
-// and TRACKING how a free path is found:
-//   EXACT    walls are where the extinction changes (Amanatides & Woo, Eurographics 1987, for voxels): tau = sum sigma_i s_i
-//   MARCH    steps of one length, each with the extinction at its start; a path ends with the step that uses it up
-//   DELTA    walls of coarse blocks, tentative collisions by the block's majorant m, real ones with probability sigma / m
-//            (Woodcock et al., ANL-7050, 1965)
-//   WEIGHTED the same where m may be too small: real with probability P = sigma / (sigma + |m - sigma|), weight times
-//            sigma / (m P) or (m - sigma) / (m (1 - P)) (Galtier et al., JQSRT 125, 2013)
 #define BOX 0
 #define LAYERS 1
 #define LABELS 2
 #define DENSITY 3
-#define EXACT 0
-#define MARCH 1
-#define DELTA 2
-#define WEIGHTED 3
 
 #define VOXEL_WALLS (TRACKING == EXACT && GEOMETRY >= LABELS)
 #define LAYER_WALLS (TRACKING == EXACT && GEOMETRY == LAYERS)
 #define BLOCK_WALLS (TRACKING >= DELTA)
 
-// Where a photon is between its walls: a voxel, a layer (z) or a block.
-typedef struct { Int x, y, z; } Cell;
-
 static inline Int cell_axis(constant const PhotonTransport *params, int axis, Real p) {
-    Int at = to_int(floor((p - params->low_mm[axis]) * params->walls_per_mm[axis]));
-    return clamp(at, (Int)(0), (Int)(params->walls[axis] - 1));
+    return cell_on_axis(p, params->low_mm[axis], params->walls_per_mm[axis], params->walls[axis]);
 }
 
 static inline Int layer_at(constant const PhotonTransport *params, global const float *table, Real z) {
@@ -54,16 +39,10 @@ static inline Real wall_ahead(constant const PhotonTransport *params, global con
     if (axis == 2) return gather_reals(table + params->at_layers, select(cell, cell + 1, up));
 #endif
 #if VOXEL_WALLS || BLOCK_WALLS
-    Int next = select(cell, cell + 1, up);
-    Real wall = mad(to_real(next), (Real)(params->wall_mm[axis]), (Real)(params->low_mm[axis]));
-    return select(wall, (Real)(params->high_mm[axis]), MASK(next >= params->walls[axis]));
+    return wall_on_axis(cell, up, params->low_mm[axis], params->wall_mm[axis], params->high_mm[axis], params->walls[axis]);
 #else
     return select((Real)(params->low_mm[axis]), (Real)(params->high_mm[axis]), up);
 #endif
-}
-
-static inline Real distance_to(Real wall, Real p, Real d) {
-    return select(fmax((wall - p) / d, (Real)(0.0f)), (Real)(1e30f), MASK(fabs(d) < 1e-12f));
 }
 
 // The voxel of the grid at a place; voxels beyond it are those at its edge.

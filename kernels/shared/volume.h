@@ -22,15 +22,8 @@ constant const sampler_t point_sampler = CLK_NORMALIZED_COORDS_FALSE | CLK_ADDRE
 #define VOLUME global const uchar *
 #endif
 
-// One voxel a lane; the index is clamped to the grid.
-static inline Real voxel_raw(constant const View *view, VOLUME voxels, Int x, Int y, Int z) {
-    x = clamp(x, (Int)(0), (Int)(view->dims[0] - 1));
-    y = clamp(y, (Int)(0), (Int)(view->dims[1] - 1));
-    z = clamp(z, (Int)(0), (Int)(view->dims[2] - 1));
-#if VOLUMES_ARE_IMAGES
-    return read_imagef(voxels, point_sampler, (int4)(x, y, z, 0)).x * CHANNEL_SCALE;
-#else
-    Int word = gather_words(voxels, ((z * view->dims[1] + y) * view->dims[0] + x) * VOXEL_BYTES);
+// The voxel at the start of a word.
+static inline Real first_voxel(Int word) {
 #if VOXEL == VOXEL_U8
     return to_real(word & 0xff);
 #elif VOXEL == VOXEL_I16
@@ -40,6 +33,17 @@ static inline Real voxel_raw(constant const View *view, VOLUME voxels, Int x, In
 #else
     return as_Real(word);
 #endif
+}
+
+// One voxel a lane; the index is clamped to the grid.
+static inline Real voxel_raw(constant const View *view, VOLUME voxels, Int x, Int y, Int z) {
+    x = clamp(x, (Int)(0), (Int)(view->dims[0] - 1));
+    y = clamp(y, (Int)(0), (Int)(view->dims[1] - 1));
+    z = clamp(z, (Int)(0), (Int)(view->dims[2] - 1));
+#if VOLUMES_ARE_IMAGES
+    return read_imagef(voxels, point_sampler, (int4)(x, y, z, 0)).x * CHANNEL_SCALE;
+#else
+    return first_voxel(gather_words(voxels, ((z * view->dims[1] + y) * view->dims[0] + x) * VOXEL_BYTES));
 #endif
 }
 

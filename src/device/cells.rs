@@ -67,7 +67,8 @@ impl Cells {
         let kernel = variant("cells", voxel);
         device.build(&build, &kernel)?;
         let [wide, high, deep] = voxel_dims.map(|n| n.div_ceil(CELL));
-        let ranges = device.allocate(2 * voxel.bytes() * wide * high * deep)?;
+        // Lanes load whole words.
+        let ranges = device.allocate(2 * voxel.bytes() * wide * high * deep + 8)?;
         let pass = device.upload(bytemuck::bytes_of(&pass(voxel_dims, 0, 0, 0.0)), 0)?;
         device.run(&kernel, &[&pass, voxels, &ranges], high * deep)?;
         Ok(Self { ranges, voxel_dims, voxel })

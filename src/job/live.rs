@@ -252,7 +252,8 @@ impl Live {
             return Ok(Verdict::Stop("time"));
         }
         let round = samples.is_power_of_two() || (samples % 3 == 0 && (samples / 3).is_power_of_two());
-        let Some(most) = budget.max_error.filter(|_| samples >= 2 && round) else { return Ok(Verdict::GoOn) };
+        let enough = samples >= scene.view().least_samples();
+        let Some(most) = budget.max_error.filter(|_| enough && round) else { return Ok(Verdict::GoOn) };
         let error = Film { field_error: self.field_error, ..view.film(context)? }.error();
         let noise = error.noise.unwrap_or(0.0);
         let bias = (error.total.powi(2) - noise.powi(2)).max(0.0).sqrt();
@@ -282,7 +283,7 @@ impl Live {
             generation: self.generation,
             elapsed_ms: self.asked.elapsed().as_secs_f64() * 1e3,
             device_ms: device_time.as_secs_f64() * 1e3,
-            non_finite_samples: view.non_finite(context)?,
+            counts: view.counts(context)?,
             result: self.result.clone(),
             stopped_by,
         };

@@ -38,10 +38,36 @@ pub(crate) struct Snapshot {
     pub generation: u64,
     pub elapsed_ms: f64,
     pub device_ms: f64,
-    pub non_finite_samples: u64,
+    pub counts: SampleCounts,
     pub result: Option<Value>,
     /// What stopped the render, on the final snapshot.
     pub stopped_by: Option<&'static str>,
+}
+
+/// What the kernels count among a picture's samples, in their order (`kernels/shared/film.h`, `kernels/shared/flight.h`).
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct SampleCounts {
+    pub non_finite: u32,
+    pub fireflies: u32,
+    pub clamped: u32,
+    pub broken: u32,
+    /// Sum of luminance.
+    pub clamped_luminance: f64,
+    pub cut: u32,
+}
+
+impl SampleCounts {
+    /// What a job says of them.
+    fn report(&self, film: &Film, counts: &mut Counts) {
+        counts.non_finite_samples = self.non_finite.into();
+        counts.fireflies = self.fireflies.into();
+        counts.clamped_samples = self.clamped.into();
+        let kept = film.luminance_sum();
+        let all = kept + self.clamped_luminance;
+        counts.clamped_energy = if all > 0.0 { self.clamped_luminance / all } else { 0.0 };
+        counts.broken_majorants = self.broken.into();
+        counts.cut_paths = self.cut.into();
+    }
 }
 
 /// What a new camera means for the engine.
@@ -267,7 +293,7 @@ impl Job {
         progress.error = Some(error);
         progress.film = Some(snapshot.film.clone());
         progress.counts.clipped_values = clipped;
-        progress.counts.non_finite_samples = snapshot.non_finite_samples;
+        snapshot.counts.report(&snapshot.film, &mut progress.counts);
         progress.stopped_by = snapshot.stopped_by.filter(|_| ends);
         progress.timings.elapsed_ms = snapshot.elapsed_ms;
         progress.timings.device_ms = snapshot.device_ms;

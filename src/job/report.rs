@@ -62,6 +62,16 @@ pub struct Counts {
     pub non_finite_samples: u64,
     /// Voxels of the volume that are not finite; they are rendered as empty.
     pub non_finite_voxels: u64,
+    /// Samples further than ten standard deviations above what their pixel had before, from its 16th sample on.
+    pub fireflies: u64,
+    /// Samples that were scaled down to `clamp_luminance`,
+    pub clamped_samples: u64,
+    /// and the part of the picture's light that this took away.
+    pub clamped_energy: f64,
+    /// Collisions at which a majorant was below the extinction.
+    pub broken_majorants: u64,
+    /// Paths that were cut off after a million collisions.
+    pub cut_paths: u64,
     /// Channel values above 1 that the newest frame's PNG clips (the EXR has them).
     pub clipped_values: u64,
 }
@@ -94,4 +104,35 @@ pub struct Frame {
     pub is_final: bool,
     /// Strong entity tag: the hash of the bytes, which hold nothing that depends on load or time.
     pub etag: String,
+}
+
+/// The power of the number of samples with which the error falls: −½ for noise. The least-squares slope of the logarithms over the
+/// frames of whole passes with two samples or more; none of fewer than three.
+pub(super) fn slope(trace: &[TracePoint]) -> Option<f64> {
+    let points: Vec<(f64, f64)> = trace
+        .iter()
+        .filter(|p| p.stride == 1 && p.samples >= 2 && p.error > 0.0)
+        .map(|p| (f64::from(p.samples).ln(), p.error.ln()))
+        .collect();
+    let n = points.len() as f64;
+    let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / n;
+    let (x, y) = (mean(|p| p.0), mean(|p| p.1));
+    let spread: f64 = points.iter().map(|p| (p.0 - x).powi(2)).sum();
+    let slope = points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum::<f64>() / spread;
+    (points.len() >= 3 && slope.is_finite()).then_some(slope)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_slope_of_noise_is_a_half() {
+        let point = |samples: u32, error: f64, stride: u32| TracePoint { elapsed_ms: 0.0, samples, error, stride };
+        let noise: Vec<TracePoint> = [2, 4, 9, 16].map(|n| point(n, 3.0 / f64::from(n).sqrt(), 1)).to_vec();
+        assert!((slope(&noise).unwrap_or(0.0) + 0.5).abs() < 1e-12);
+        assert_eq!(slope(&noise[..2]), None);
+        let previews = [point(1, 5.0, 8), point(2, 1.0, 1), point(3, 1.0, 1)];
+        assert_eq!(slope(&previews), None);
+    }
 }

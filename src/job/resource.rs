@@ -36,6 +36,7 @@ impl Job {
             "counts": p.counts,
             "warnings": p.warnings,
             "trace": p.trace,
+            "trace_slope": super::report::slope(&p.trace),
             "result": p.result,
             "created_unix_s": self.created_unix_s,
             "links": {"self": path(""), "frames": path("/frames"), "png": path("/frame.png"), "exr": path("/frame.exr"),

@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use glam::Vec2;
 
+use super::SampleCounts;
 use super::context::{DeviceContext, DeviceVolume, warm};
 use super::pace::Pace;
 use crate::device::Buffer;
@@ -69,6 +70,7 @@ pub(super) struct ViewRun {
     /// The longest way through the volume, world units.
     longest: f64,
     least_step: f32,
+    tile: Option<usize>,
     /// Device time since the start.
     pub device_time: Duration,
 }
@@ -118,6 +120,7 @@ impl ViewRun {
             pass_time: Duration::ZERO,
             longest,
             least_step: (LEAST_STEP_VOXELS * smallest) as f32,
+            tile: scene.view().tile(),
             plan,
             volume: on_device,
             distances,
@@ -218,7 +221,10 @@ impl ViewRun {
         };
         let layer = &self.layers[index(pass)];
         let lanes = context.device.info().lanes as usize;
-        let [beam_w, beam_h] = beam_pixels(lanes);
+        let [beam_w, beam_h] = match self.tile {
+            Some(side) if lanes > 1 => [side; 2],
+            _ => beam_pixels(lanes),
+        };
         let beams = layer.width.div_ceil(beam_w) * layer.height.div_ceil(beam_h);
         let rays = beam_w * beam_h;
         let items = self.pace.items(context.device.info(), slice, rays).min(beams - self.cursor);
@@ -303,11 +309,13 @@ impl ViewRun {
         })
     }
 
-    /// Samples that were not finite.
-    pub fn non_finite(&self, context: &DeviceContext) -> Result<u64> {
-        let mut counts = [0u32; 1];
+    /// What the kernels have counted.
+    pub fn counts(&self, context: &DeviceContext) -> Result<SampleCounts> {
+        let mut counts = [0u32; 8];
         context.device.read(&self.counts, 0, &mut counts)?;
-        Ok(u64::from(counts[0]))
+        let [non_finite, fireflies, clamped, broken, low, high, cut, _] = counts;
+        let clamped_luminance = (u64::from(high) << 32 | u64::from(low)) as f64 / 65536.0;
+        Ok(SampleCounts { non_finite, fireflies, clamped, broken, clamped_luminance, cut })
     }
 }
 

@@ -180,7 +180,8 @@ impl Framing {
         Self { corners: std::array::from_fn(corner), scan }
     }
 
-    fn up(&self) -> DVec3 {
+    /// Which way is up: z for a scan, y for what has no patient.
+    pub fn up(&self) -> DVec3 {
         if self.scan { DVec3::Z } else { DVec3::Y }
     }
 

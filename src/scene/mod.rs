@@ -4,6 +4,9 @@ pub mod camera;
 pub mod clip;
 pub mod interpolation;
 pub mod light;
+pub mod lights;
+pub mod medium;
+pub mod phase;
 pub mod presets;
 pub mod transfer;
 pub mod window;
@@ -129,6 +132,10 @@ impl Scene {
         let (subject, framing) = subject(request.volume.as_ref(), store, limits)?;
         let camera = Camera::from_request(request.camera.as_ref(), &framing)?;
         let clip = Clip::from_request(request.clip.as_ref())?;
+        if request.clip.is_some() && !view.clips() {
+            let detail = format!("{} shows the whole volume: light comes from everywhere", technique.name);
+            return Err(Error::invalid("/clip", detail, "leave it out, or another technique"));
+        }
         let image = request.image.unwrap_or_default();
         let background = background(&image)?;
         let image = [image.width.unwrap_or(DEFAULT_SIDE), image.height.unwrap_or(DEFAULT_SIDE)];

@@ -4,7 +4,10 @@ pub mod emission_absorption;
 pub mod isosurface;
 pub mod photon_transport;
 pub mod projection;
+pub mod scattering;
+pub mod single_scatter;
 pub mod slice;
+pub mod volume_path;
 
 use std::sync::Arc;
 
@@ -22,7 +25,9 @@ pub const ALL: &[Technique] = &[
     isosurface::TECHNIQUE,
     photon_transport::TECHNIQUE,
     projection::TECHNIQUE,
+    single_scatter::TECHNIQUE,
     slice::TECHNIQUE,
+    volume_path::TECHNIQUE,
 ];
 
 /// The kernel headers that every view is built with, in order.
@@ -140,6 +145,19 @@ pub trait View: Send + Sync {
     }
     /// What it asks of the fields that all views share, such as its lights.
     fn look(&self, _camera: &Camera, _view: &mut DeviceView) {}
+    /// Whether it can leave out what is beyond clipping planes.
+    fn clips(&self) -> bool {
+        true
+    }
+    /// Pixels along a side of the square that a work-item renders, where it is not a beam of `kernels/shared/packet.h`; one where the
+    /// device has one lane.
+    fn tile(&self) -> Option<usize> {
+        None
+    }
+    /// Samples per pixel before which a render does not stop for its error: of fewer the error itself is not known.
+    fn least_samples(&self) -> u32 {
+        2
+    }
     /// What a reader should know of the parameters on this volume: objects with `code` and `message`.
     fn warnings(&self, _volume: &Volume) -> Vec<Value> {
         Vec::new()

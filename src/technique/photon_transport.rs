@@ -97,6 +97,7 @@ fn source() -> Source {
             "shared/rng.h",
             "shared/phase.h",
             "shared/fresnel.h",
+            "shared/walls.h",
             "shared/medium.h",
             "shared/tally.h",
             "shared/deposit.h",

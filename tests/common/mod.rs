@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test says what is wrong by panicking")]
 
 pub mod engine;
+pub mod light;
 
 use std::io::{BufRead, BufReader};
 use std::path::PathBuf;

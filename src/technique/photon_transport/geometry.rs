@@ -5,9 +5,10 @@ use serde::Deserialize;
 use serde_json::json;
 
 use super::layers::{self, Layer};
-use super::medium::{Medium, Phase};
+use super::medium::Medium;
 use super::parameters::Parameters;
 use crate::error::{Error, Result};
+use crate::scene::phase::Phase;
 use crate::volume::{Store, Volume, builtin};
 
 /// A volume whose voxels say what is where.

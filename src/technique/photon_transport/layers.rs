@@ -5,8 +5,9 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::attenuation::Attenuation;
-use super::medium::{Medium, Phase};
+use super::medium::Medium;
 use crate::error::{Error, Result};
+use crate::scene::phase::Phase;
 
 /// A layer along z.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]

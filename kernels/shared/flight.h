@@ -1,0 +1,255 @@
+// Flights of light through a volume whose values are densities: extinction = density * sigma_t. Places are in index units, lengths in
+// world units. A free flight ends at a real collision; a ratio flight estimates the transmittance to its end (ratio tracking,
+// Novak, Selle, Jarosz, SIGGRAPH Asia 2014: T = prod (1 - sigma / m) over tentative collisions; in closed form where the extinction
+// is constant from wall to wall). GEOMETRY is BOX, where the density is the same everywhere, or GRID.
+// Extinctions of three colours are tracked together by that of the greatest: a collision is real with the probability
+// P = sum(w sigma) / (m sum(w)) of the light w that is left, and the colours are weighed by sigma / (m P) or (m - sigma) / (m (1 - P))
+// (Kutz, Habel, Li, Novak, "Spectral and Decomposition Tracking", SIGGRAPH 2017).
+#define BOX 0
+#define GRID 1
+
+#define COUNT_FIREFLIES 1
+#define COUNT_CLAMPED 2
+#define COUNT_BROKEN 3
+#define COUNT_CLAMPED_ENERGY 4 // two words, in units of 2^-16
+#define COUNT_CUT 6
+// A path of more collisions than this is cut and counted.
+#define MOST_EVENTS 1000000u
+
+// Transmittances below this meet the roulette.
+#define FAINT 0.05f
+
+typedef struct {
+    Real3 p, d, way;     // place; direction, of unit length in the world; the same in index units per world unit
+    Real3 inverse;       // 1 / way
+    Cell cell;
+    Real depth;          // what is left of the free path, in optical depth
+    Real left;           // the length to the end of the flight
+    Real3 carried;       // light, or what of it gets to the eye
+    Real weight;         // what the flight makes of it
+    Mask ratio;
+    UInt number, event;  // key the random numbers: the pixel, and what has happened on its path
+} Flight;
+
+// Four numbers of a path's next event; `what` tells the draws of one event apart.
+static inline UInt4Lanes draw(constant const View *view, const Flight *f, uint what) {
+    UInt4Lanes ctr = {f->number, (UInt)((uint)view->sample), f->event, (UInt)(view->stream + 0x6c696700u + 16u * what)};
+    return philox(ctr, view->seed[0], view->seed[1]);
+}
+
+static inline Real free_depth(UInt bits) { return -log(unit_open(bits)); }
+
+static inline Medium phase_of(constant const Scattering *params) {
+    Medium m;
+    m.extinction = m.albedo = (Real)(1.0f);
+    m.kind = (Int)((int)params->phase[0]);
+    m.a = (Real)(params->phase[1]), m.b = (Real)(params->phase[2]), m.c = (Real)(params->phase[3]);
+    return m;
+}
+
+static inline Real3 world_of(constant const Scattering *params, Real3 p) {
+    constant const float *m = params->world_from_index;
+    return real3(mad(m[0], p.x, mad(m[3], p.y, mad(m[6], p.z, (Real)(m[9])))), mad(m[1], p.x, mad(m[4], p.y, mad(m[7], p.z, (Real)(m[10])))),
+                 mad(m[2], p.x, mad(m[5], p.y, mad(m[8], p.z, (Real)(m[11])))));
+}
+
+// Points the lanes of `turned` along their d, from their p.
+static inline void aim(constant const View *view, constant const Scattering *params, Mask turned, Flight *f) {
+    constant const float *w = view->world_gradient_from_index;
+    Real3 d = f->d;
+    Real3 way = real3(mad(w[0], d.x, mad(w[3], d.y, w[6] * d.z)), mad(w[1], d.x, mad(w[4], d.y, w[7] * d.z)),
+                      mad(w[2], d.x, mad(w[5], d.y, w[8] * d.z)));
+    f->way = select3(f->way, way, turned);
+    f->inverse = select3(f->inverse, real3(1.0f / way.x, 1.0f / way.y, 1.0f / way.z), turned);
+    f->cell.x = select(f->cell.x, cell_on_axis(f->p.x, 0.0f, params->walls_per_voxel[0], params->walls[0]), turned);
+    f->cell.y = select(f->cell.y, cell_on_axis(f->p.y, 0.0f, params->walls_per_voxel[1], params->walls[1]), turned);
+    f->cell.z = select(f->cell.z, cell_on_axis(f->p.z, 0.0f, params->walls_per_voxel[2], params->walls[2]), turned);
+}
+
+// The density of a raw value; what is not a number is empty.
+static inline Real density_of(constant const Scattering *params, Real raw) {
+    Real density = fmin(mad(raw, (Real)(params->density_scale), (Real)(params->density_offset)), (Real)(params->density_most));
+    return select((Real)(0.0f), density, MASK(density > 0.0f));
+}
+
+static inline Real density_at(constant const View *view, constant const Scattering *params, VOLUME voxels, Real3 p) {
+#if GEOMETRY == BOX
+    return (Real)(params->density_box);
+#else
+    return density_of(params, sample_raw(view, voxels, p));
+#endif
+}
+
+// The least or the greatest voxel that a sample in a macro-cell reads.
+static inline Real range_end(global const uchar *ranges, Int cell, int greatest) {
+    return first_voxel(gather_words(ranges, (cell * 2 + greatest) * VOXEL_BYTES));
+}
+
+// How often a free path ends in the cell, per length: the greatest colour's extinction, or a majorant of it.
+static inline Real rate_at(constant const View *view, constant const Scattering *params, VOLUME voxels, global const uchar *ranges, const Flight *f) {
+#if GEOMETRY == BOX
+    return (Real)(params->majorant);
+#elif TRACKING == EXACT
+    return density_of(params, voxel_raw(view, voxels, f->cell.x, f->cell.y, f->cell.z)) * params->sigma_most;
+#elif TRACKING == MARCH
+    return density_at(view, params, voxels, f->p) * params->sigma_most;
+#else
+    if (params->whole) return (Real)(params->majorant);
+    Int cell = (f->cell.z * params->walls[1] + f->cell.y) * params->walls[0] + f->cell.x;
+    return density_of(params, range_end(ranges, cell, params->density_scale > 0.0f)) * params->majorant;
+#endif
+}
+
+// Which of the tentative collisions are real where colours have extinctions of their own, the greatest `sigma`.
+static inline Mask tell_colours(constant const Scattering *params, Real sigma, Real rate, Real u, Mask hit, Flight *f) {
+    Mask free = hit & ~f->ratio;
+    Real3 s = real3(sigma * params->colour[0], sigma * params->colour[1], sigma * params->colour[2]), w = f->carried;
+    Real3 through = real3(1.0f - s.x / rate, 1.0f - s.y / rate, 1.0f - s.z / rate);
+    Real sum = fabs(w.x) + fabs(w.y) + fabs(w.z), mean = mad(fabs(w.x), s.x, mad(fabs(w.y), s.y, fabs(w.z) * s.z)) / fmax(sum, (Real)(1e-30f));
+    // Where the majorant is too small, the chance of a real collision stays below 1.
+    Real chance = fmin(mean / rate, select((Real)(1.0f), (Real)(0.5f), MASK(sigma > rate)));
+    Mask real = free & MASK(u < chance);
+    Real if_real = 1.0f / (rate * chance), if_null = 1.0f / (1.0f - chance);
+    Real3 by = select3(scale3(through, if_null), scale3(s, if_real), real);
+    by = select3(by, through, f->ratio);
+    // The weight is the greatest colour's, for the roulette.
+    Real most = fmax(fabs(by.x), fmax(fabs(by.y), fabs(by.z))), inverse = 1.0f / fmax(most, (Real)(1e-30f));
+    Mask lights = hit & MASK(most > 0.0f);
+    f->carried = select3(f->carried, real3(w.x * by.x * inverse, w.y * by.y * inverse, w.z * by.z * inverse), lights);
+    f->weight = select(f->weight, f->weight * most, hit);
+    return real;
+}
+
+// Which of the collisions by `rate` are real, where the extinction is `sigma`.
+static inline Mask tell_collisions(constant const Scattering *params, Real sigma, Real rate, Real u, Mask hit, Flight *f) {
+    if (params->chromatic) return tell_colours(params, sigma, rate, u, hit, f);
+#if TRACKING < DELTA
+    return hit;
+#else
+    Real factor;
+    Mask real = real_collisions(sigma, rate, u, hit & ~f->ratio, &factor);
+    factor = select(factor, 1.0f - sigma / rate, f->ratio);
+    f->weight = select(f->weight, f->weight * factor, hit);
+    return real;
+#endif
+}
+
+// One step of every lane that is alive: to a collision, a wall, or the end of its flight. Returns the real collisions of free flights,
+// with numbers for what follows in *r; *over are those that came to their end or left the volume through the face *face (-1: not).
+static inline Mask fly(constant const View *view, constant const Scattering *params, VOLUME voxels, global const uchar *ranges,
+                       global uint *counts, Mask alive, Flight *f, UInt4Lanes *r, Mask *over, Int *face) {
+    Real rate = rate_at(view, params, voxels, ranges, f);
+    #define WALL(i, c) wall_on_axis(f->cell.c, MASK(f->way.c > 0.0f), 0.0f, params->wall_voxels[i], (float)view->dims[i], params->walls[i])
+    #define REACH(c) select(fmax((w##c - f->p.c) * f->inverse.c, (Real)(0.0f)), (Real)(1e30f), MASK(fabs(f->way.c) < 1e-12f))
+    Real wx = WALL(0, x), wy = WALL(1, y), wz = WALL(2, z);
+    Real tx = REACH(x), ty = REACH(y), tz = REACH(z);
+    #undef WALL
+    #undef REACH
+    Real t_wall = fmin(tx, fmin(ty, tz)), room = fmin(t_wall, f->left);
+    Mask ends = alive & MASK(f->left <= t_wall);
+#if TRACKING == MARCH
+    Real t = fmin(room, (Real)(params->march_step));
+    Mask short_of = MASK(t < room), hit = alive & ~f->ratio & short_of & MASK(f->depth <= rate * t) & MASK(rate > 0.0f);
+    ends &= ~short_of;
+    Mask crosses = alive & ~hit & ~ends & ~short_of;
+#else
+    Mask hit = alive & MASK(f->depth < rate * room);
+#if TRACKING == EXACT
+    hit &= ~f->ratio;
+#endif
+    Real t = select(room, f->depth / rate, hit);
+    ends &= ~hit;
+    Mask crosses = alive & ~hit & ~ends;
+#endif
+#if TRACKING < DELTA
+    if (any_lane(alive & f->ratio)) {
+        Real tau = rate * t, at = select((Real)(0.0f), tau, alive & f->ratio);
+        if (params->chromatic) {
+            // The greatest colour's weight is the least: the others are carried.
+            Real3 s = real3(params->colour[0], params->colour[1], params->colour[2]);
+            Real least = fmin(s.x, fmin(s.y, s.z));
+            f->weight *= exp(-at * least);
+            f->carried = real3(f->carried.x * exp(-at * (s.x - least)), f->carried.y * exp(-at * (s.y - least)), f->carried.z * exp(-at * (s.z - least)));
+        } else {
+            f->weight *= exp(-at);
+        }
+    }
+#endif
+    f->p = select3(f->p, along(f->p, f->way, t), alive);
+    f->left = select(f->left, f->left - t, alive);
+    f->depth = select(f->depth, fmax(mad(-rate, t, f->depth), (Real)(0.0f)), alive & ~hit);
+    *over = ends;
+    *face = (Int)(-1);
+    if (any_lane(crosses)) {
+        Mask in_x = crosses & MASK(tx == t_wall), in_y = crosses & ~in_x & MASK(ty == t_wall), in_z = crosses & ~in_x & ~in_y;
+        #define CROSS(i, c)                                                                                                \
+            f->p.c = select(f->p.c, w##c, in_##c);                                                                         \
+            f->cell.c += select((Int)(0), select((Int)(-1), (Int)(1), MASK(f->way.c > 0.0f)), in_##c);                     \
+            {                                                                                                              \
+                Mask out = in_##c & (MASK(f->cell.c < 0) | MASK(f->cell.c >= params->walls[i]));                           \
+                *over |= out;                                                                                              \
+                *face = select(*face, (Int)(i), out);                                                                      \
+            }
+        CROSS(0, x)
+        CROSS(1, y)
+        CROSS(2, z)
+        #undef CROSS
+    }
+    if (!any_lane(hit)) return hit;
+    *r = draw(view, f, 0);
+    f->depth = select(f->depth, free_depth(r->c), hit);
+    f->event += as_UInt(select((Int)(0), (Int)(1), hit));
+    Real u = unit_open(r->d);
+#if TRACKING < DELTA
+    return tell_collisions(params, rate, rate, u, hit, f);
+#else
+    Real sigma = density_at(view, params, voxels, f->p) * params->sigma_most;
+    Mask broken = hit & MASK(sigma > rate * 1.00001f);
+    if (any_lane(broken)) atomic_add(&counts[COUNT_BROKEN], (uint)count_lanes(broken));
+    Mask real = tell_collisions(params, sigma, rate, u, hit, f);
+    Mask faint = hit & f->ratio & MASK(fabs(f->weight) < FAINT);
+    if (any_lane(faint)) {
+        Real chance = fabs(f->weight) * (1.0f / FAINT);
+        Mask stays = MASK(u < chance);
+        f->weight = select(f->weight, select((Real)(0.0f), copysign((Real)(FAINT), f->weight), stays), faint);
+        *over |= faint & ~stays;
+    }
+    return real;
+#endif
+}
+
+// A sample is a firefly if it is further than ten standard deviations above what its pixel has had so far: of noise that dies away as it
+// should there are hardly any.
+#define FIREFLY_FROM 16
+static inline int firefly(global const float *film, int pixel, int pixels, int samples, float4 colour) {
+    float mean = luminance(vload4(pixel, film)), variance = film[4 * pixels + pixel] / (float)(samples - 1), above = luminance(colour) - mean;
+    return mean > 0.0f && above > 0.0f && above * above > 100.0f * variance;
+}
+
+// The film's part of the paths in `done`: the next sample of their pixels.
+static inline void finish(constant const View *view, constant const Scattering *params, global float *film, global uint *counts, Int at,
+                          Mask done, Real3 light, Real alpha) {
+    RealLanes red, green, blue, opacity;
+    IntLanes pixel, on;
+    if (params->clamp_luminance > 0.0f) {
+        Real y = mad((Real)(0.2126f), light.x, mad((Real)(0.7152f), light.y, 0.0722f * light.z));
+        Mask bright = done & MASK(y > params->clamp_luminance);
+        if (any_lane(bright)) {
+            atomic_add(&counts[COUNT_CLAMPED], (uint)count_lanes(bright));
+            RealLanes taken;
+            taken.v = select((Real)(0.0f), fmin(y - params->clamp_luminance, (Real)(1e9f)), bright);
+            for (int i = 0; i < LANES; i++)
+                if (taken.lane[i] > 0.0f) atom_add((global ulong *)(counts + COUNT_CLAMPED_ENERGY), (ulong)(taken.lane[i] * 65536.0f));
+            light = select3(light, scale3(light, params->clamp_luminance / y), bright);
+        }
+    }
+    red.v = light.x, green.v = light.y, blue.v = light.z, opacity.v = alpha;
+    pixel.v = at, on.v = done;
+    int pixels = view->width * view->height;
+    for (int i = 0; i < LANES; i++) {
+        if (!on.lane[i]) continue;
+        float4 colour = (float4)(red.lane[i], green.lane[i], blue.lane[i], opacity.lane[i]);
+        if (view->sample >= FIREFLY_FROM && firefly(film, pixel.lane[i], pixels, view->sample, colour)) atomic_inc(&counts[COUNT_FIREFLIES]);
+        film_add(film, counts, pixel.lane[i], pixels, view->sample, colour);
+    }
+}

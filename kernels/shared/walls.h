@@ -1,0 +1,44 @@
+// Cells of one size along each axis, with walls between them at which a flight must look again, and how a free path that was drawn
+// with too large an extinction tells real collisions from null ones. TRACKING says how a free path is found:
+//   EXACT    walls are where the extinction changes (Amanatides & Woo, Eurographics 1987, for voxels): tau = sum sigma_i s_i
+//   MARCH    steps of one length, each with the extinction at its start; a path ends with the step that uses it up
+//   DELTA    walls of coarse blocks, tentative collisions by the block's majorant m, real ones with probability sigma / m
+//            (Woodcock et al., ANL-7050, 1965)
+//   WEIGHTED the same where m may be too small: real with probability P = sigma / (sigma + |m - sigma|), weight times
+//            sigma / (m P) or (m - sigma) / (m (1 - P)) (Galtier et al., JQSRT 125, 2013)
+#define EXACT 0
+#define MARCH 1
+#define DELTA 2
+#define WEIGHTED 3
+
+// A voxel, a layer (z) or a block.
+typedef struct { Int x, y, z; } Cell;
+
+static inline Int cell_on_axis(Real p, float low, float cells_per_length, int cells) {
+    return clamp(to_int(floor((p - low) * cells_per_length)), (Int)(0), (Int)(cells - 1));
+}
+
+// The wall ahead of a cell; the last cell may be cut short.
+static inline Real wall_on_axis(Int cell, Mask up, float low, float side, float high, int cells) {
+    Int next = select(cell, cell + 1, up);
+    return select(mad(to_real(next), (Real)(side), (Real)(low)), (Real)(high), MASK(next >= cells));
+}
+
+static inline Real distance_to(Real wall, Real p, Real d) {
+    return select(fmax((wall - p) / d, (Real)(0.0f)), (Real)(1e30f), MASK(fabs(d) < 1e-12f));
+}
+
+#if TRACKING >= DELTA
+// Which of the tentative collisions `hit` are real, by the number u; a weight is times *factor.
+static inline Mask real_collisions(Real sigma, Real rate, Real u, Mask hit, Real *factor) {
+#if TRACKING == DELTA
+    *factor = (Real)(1.0f);
+    return hit & MASK(u * rate < sigma);
+#else
+    Real null = rate - sigma, chance = sigma / (sigma + fabs(null));
+    Mask real = hit & MASK(u < chance);
+    *factor = select(null / (rate * (1.0f - chance)), sigma / (rate * chance), real);
+    return real;
+#endif
+}
+#endif

@@ -1,0 +1,278 @@
+// Light that is scattered once on its way to the eye, and what comes straight. From the eye a free flight finds a collision; from there
+// a ratio flight goes to every light, and a free flight in a direction of the phase function to the sky. Points, spheres and quads are
+// also lit from places chosen by the angle under which they are seen from them (Kulla & Fajardo, "Importance Sampling Techniques for
+// Path Tracing in Participating Media", EGSR 2012): t - t_light = D tan(theta), density D / ((theta_b - theta_a) (D^2 + (t - t_light)^2)).
+// The free flight's density is known only on average, e = sigma exp(-sigma t); any weights that sum to 1 leave the mean as it is.
+// One work-item is a tile of ITEM x ITEM pixels; a lane that is through with its sample takes the next of them.
+
+#if LANES == 1
+#define ITEM 1
+#else
+#define ITEM 16
+#endif
+#define REFILL (LANES / 8 + 1)
+
+// What a lane is at: 0 the way from the eye; 1 .. lights a light seen from the collision; then the sky; then for each light the way
+// from the eye to a place chosen by angle, and from there to the light.
+typedef struct {
+    Flight flight;
+    Int at, task;
+    Real3 light;
+    Real alpha;
+    Real3 entry, entry_world, d; // where the ray from the eye enters the volume
+    Real length, t_from;         // how far it goes through it; where it begins
+    Mask met;                    // whether it met a collision,
+    Real3 place, place_world;    // and where
+    Real3 scattered;             // what of its light leaves it
+    Real density;                // of the phase function's direction
+} Sample;
+
+static inline void add_light(Sample *s, Real3 light, Mask on) { s->light = select3(s->light, add3(s->light, light), on); }
+
+static inline void begin(constant const View *view, constant const Scattering *params, Int column, Int row, Mask fresh, Sample *s) {
+    Flight *f = &s->flight;
+    Real x = to_real(column * view->stride) + view->offset[0], y = to_real(row * view->stride) + view->offset[1];
+    Ray ray = camera_ray(view, x, y);
+    Mask meets = MASK(ray.t_far > ray.t_near);
+    Real eye = eye_on_ray(view, x, y), entry = select(eye, ray.t_near, meets);
+    Real3 none = real3((Real)(0.0f), (Real)(0.0f), (Real)(0.0f));
+    s->at = select(s->at, row * view->width + column, fresh);
+    s->task = select(s->task, (Int)(0), fresh);
+    s->light = select3(s->light, none, fresh);
+    s->alpha = select(s->alpha, (Real)(1.0f), fresh);
+    s->met &= ~fresh;
+    s->entry = select3(s->entry, along(ray.origin, ray.direction, entry), fresh);
+    s->entry_world = select3(s->entry_world, world_of(params, s->entry), fresh);
+    s->d = select3(s->d, ray_world(view, x, y), fresh);
+    s->length = select(s->length, select((Real)(0.0f), ray.t_far - ray.t_near, meets), fresh);
+    s->t_from = select(s->t_from, eye - entry, fresh);
+    f->number = as_UInt(select(as_Int(f->number), row * view->stride * view->full_width + column * view->stride, fresh));
+    f->event = as_UInt(select(as_Int(f->event), (Int)(1), fresh));
+    f->p = select3(f->p, s->entry, fresh);
+    f->d = select3(f->d, s->d, fresh);
+    f->carried = select3(f->carried, real3((Real)(1.0f), (Real)(1.0f), (Real)(1.0f)), fresh);
+    f->weight = select(f->weight, (Real)(1.0f), fresh);
+    f->left = select(f->left, select((Real)(0.0f), (Real)(1e30f), meets), fresh);
+    f->depth = select(f->depth, free_depth(draw(view, f, 1).a), fresh);
+    f->ratio &= ~fresh;
+    aim(view, params, fresh, f);
+}
+
+// The density of the length t by the angle under which the light is seen, and of the free flight on average; and, given the number u, a
+// length by that angle.
+static inline Real by_angle(const Sample *s, const Light *l, Real u, Mask choose, Real *t) {
+    Real3 middle = select3(l->place, along(along(l->place, l->u, (Real)(0.5f)), l->v, (Real)(0.5f)), MASK(l->kind == LIGHT_QUAD));
+    Real3 to = minus3(middle, s->entry_world);
+    Real t_light = dot3(to, s->d);
+    Real3 off = minus3(to, scale3(s->d, t_light));
+    Real far = fmax(sqrt(dot3(off, off)), fmax(1e-6f * s->length, (Real)(1e-20f)));
+    Real a = atan(-t_light / far), b = atan((s->length - t_light) / far);
+    Real chosen = t_light + far * tan(mad(u, b - a, a));
+    *t = select(*t, clamp(chosen, (Real)(0.0f), s->length), choose);
+    Real past = *t - t_light;
+    return far / (fmax(b - a, (Real)(1e-20f)) * mad(far, far, past * past));
+}
+
+static inline Real by_flight(constant const Scattering *params, Real t) { return params->sigma_mean * exp(-params->sigma_mean * t); }
+
+// The light that reaches a place from a light, scattered towards the eye, with the part of it that is not left to the phase function.
+static inline Real3 lit(constant const Scattering *params, global const float *table, const Sample *s, const Light *l, Real3 at, Real3 from,
+                        UInt4Lanes r, LightRay *ray) {
+    Medium m = phase_of(params);
+    *ray = light_ray(l, at, unit_open(r.a), unit_open(r.b));
+    Real density = phase_density(table, &m, clamp(dot3(from, ray->d), (Real)(-1.0f), (Real)(1.0f)));
+    Real share = select((Real)(1.0f), ray->density / (ray->density + density), MASK(ray->density > 0.0f));
+    return scale3(ray->light, density * share);
+}
+
+static inline void to_light(const LightRay *ray, Real3 carried, UInt bits, Mask on, Flight *f) {
+    f->carried = select3(f->carried, carried, on);
+    f->d = select3(f->d, ray->d, on);
+    f->left = select(f->left, ray->length, on);
+    f->weight = select(f->weight, (Real)(1.0f), on);
+    f->depth = select(f->depth, free_depth(bits), on);
+    f->ratio |= on;
+}
+
+static inline Mask shines(Real3 c) { return MASK(fabs(c.x) + fabs(c.y) + fabs(c.z) > 0.0f); }
+
+// Flights to light `which` from the collision.
+static inline Mask from_collision(constant const View *view, constant const Scattering *params, global const float *table, Mask on, Int which, Sample *s) {
+    Flight *f = &s->flight;
+    UInt4Lanes r = draw(view, f, 1);
+    Light l = light_of(params, table, which);
+    LightRay ray;
+    Real3 light = times3(s->scattered, lit(params, table, s, &l, s->place_world, s->d, r, &ray));
+    if (params->equiangular) {
+        Real3 way = minus3(s->place_world, s->entry_world);
+        Real t = sqrt(dot3(way, way)), mean = by_flight(params, t), angle = by_angle(s, &l, (Real)(0.5f), (Mask)(0), &t);
+        light = select3(light, scale3(light, mean / (mean + angle)), MASK(l.kind != LIGHT_SUN));
+    }
+    on &= shines(light);
+    f->p = select3(f->p, s->place, on);
+    to_light(&ray, light, r.c, on, f);
+    return on;
+}
+
+// Flights from the collision in a direction of the phase function.
+static inline Mask to_sky(constant const View *view, constant const Scattering *params, global const float *table, Mask on, Sample *s) {
+    Flight *f = &s->flight;
+    UInt4Lanes r = draw(view, f, 1);
+    Medium m = phase_of(params);
+    Real one_minus, one_plus;
+    sample_phase(table, &m, unit_open(r.a), &one_minus, &one_plus);
+    s->density = select(s->density, phase_density(table, &m, 1.0f - one_minus), on);
+    f->p = select3(f->p, s->place, on);
+    f->d = select3(f->d, turned(s->d, one_minus, one_plus, unit_open(r.b)), on);
+    f->carried = select3(f->carried, s->scattered, on);
+    f->weight = select(f->weight, (Real)(1.0f), on);
+    f->left = select(f->left, (Real)(1e30f), on);
+    f->depth = select(f->depth, free_depth(r.c), on);
+    f->ratio &= ~on;
+    return on;
+}
+
+// Flights from the eye to a place chosen by the angle of light `which`; it carries what will be scattered there of density 1.
+static inline Mask to_place(constant const View *view, constant const Scattering *params, global const float *table, Mask on, Int which, Sample *s) {
+    Flight *f = &s->flight;
+    UInt4Lanes r = draw(view, f, 1);
+    Light l = light_of(params, table, which);
+    on &= MASK(l.kind != LIGHT_SUN) & MASK(s->length > 0.0f);
+    Real t = (Real)(0.0f), angle = by_angle(s, &l, unit_open(r.a), (Mask)(-1), &t);
+    Real over = 1.0f / (angle + by_flight(params, t));
+    #define SCATTERS(i) (params->sigma_t[i] * params->albedo[i]) * over
+    f->carried = select3(f->carried, real3(SCATTERS(0), SCATTERS(1), SCATTERS(2)), on);
+    #undef SCATTERS
+    f->p = select3(f->p, s->entry, on);
+    f->d = select3(f->d, s->d, on);
+    f->left = select(f->left, t, on);
+    f->weight = select(f->weight, (Real)(1.0f), on);
+    f->depth = select(f->depth, free_depth(r.b), on);
+    f->ratio |= on;
+    return on;
+}
+
+// From the place that was flown to, to the light.
+static inline Mask from_place(constant const View *view, constant const Scattering *params, VOLUME voxels, global const float *table, Mask on, Int which,
+                              Sample *s) {
+    Flight *f = &s->flight;
+    UInt4Lanes r = draw(view, f, 1);
+    Light l = light_of(params, table, which);
+    LightRay ray;
+    Real3 light = lit(params, table, s, &l, world_of(params, f->p), s->d, r, &ray);
+    light = scale3(times3(light, f->carried), f->weight * density_at(view, params, voxels, f->p));
+    on &= shines(light);
+    to_light(&ray, light, r.c, on, f);
+    return on;
+}
+
+// Gives the lanes of `idle` their next flight. Returns the samples that are through.
+static inline Mask advance(constant const View *view, constant const Scattering *params, VOLUME voxels, global const float *table, Mask idle, Sample *s) {
+    int lights = params->lights, last = params->equiangular ? 3 * lights + 1 : lights + 1;
+    Mask through = (Mask)(0), begun = (Mask)(0);
+    while (any_lane(idle)) {
+        s->task += select((Int)(0), (Int)(1), idle);
+        s->flight.event += as_UInt(select((Int)(0), (Int)(1), idle));
+        Mask ends = idle & MASK(s->task > last);
+        through |= ends;
+        idle &= ~ends;
+        Mask collided = idle & s->met, aims = collided & MASK(s->task <= lights), skies = collided & MASK(s->task == lights + 1), starts = (Mask)(0);
+        Mask angles = idle & MASK(s->task > lights + 1), flies = angles & MASK(((s->task - lights) & 1) == 0), flown = angles & ~flies;
+        if (any_lane(aims)) starts |= from_collision(view, params, table, aims, clamp(s->task - 1, (Int)(0), (Int)(max(lights - 1, 0))), s);
+        if (any_lane(skies) && params->lit_by_chance) starts |= to_sky(view, params, table, skies, s);
+        Int which = clamp((s->task - lights - 2) >> 1, (Int)(0), (Int)(max(lights - 1, 0)));
+        if (any_lane(flown)) starts |= from_place(view, params, voxels, table, flown, which, s);
+        if (any_lane(flies)) {
+            Mask out = to_place(view, params, table, flies, which, s);
+            starts |= out;
+            // There is no place to go on from.
+            s->task += select((Int)(0), (Int)(1), flies & ~out);
+        }
+        begun |= starts;
+        idle &= ~starts;
+    }
+    if (any_lane(begun)) aim(view, params, begun, &s->flight);
+    return through;
+}
+
+// Free flights that met a collision: the first scatters, the one after it only shines.
+static inline void collide(constant const Scattering *params, global const float *table, Mask real, Sample *s) {
+    Flight *f = &s->flight;
+    Mask first = real & MASK(s->task == 0);
+    Real3 at = world_of(params, f->p), arrives = scale3(f->carried, f->weight);
+    Real3 origin = select3(s->place_world, s->entry_world, first), way = minus3(at, origin);
+    if (params->discs) {
+        Real3 light = met(params, table, origin, f->d, select((Real)(0.0f), s->t_from, first), sqrt(dot3(way, way)), s->density, ~first, 1);
+        add_light(s, times3(light, arrives), real);
+    }
+    add_light(s, real3(arrives.x * params->emission[0], arrives.y * params->emission[1], arrives.z * params->emission[2]), real);
+    Real3 leaves = real3(arrives.x * params->albedo[0], arrives.y * params->albedo[1], arrives.z * params->albedo[2]);
+    s->place = select3(s->place, f->p, first);
+    s->place_world = select3(s->place_world, at, first);
+    s->scattered = select3(s->scattered, leaves, first);
+    s->met |= first & shines(leaves);
+}
+
+// Flights that came to their end: at a light, at a place, or out of the volume.
+static inline void arrive(constant const Scattering *params, global const float *table, Mask over, Sample *s) {
+    Flight *f = &s->flight;
+    Real3 arrives = scale3(f->carried, f->weight);
+    Mask flown = MASK(s->task > params->lights + 1) & MASK(((s->task - params->lights) & 1) == 0);
+    add_light(s, arrives, over & f->ratio & ~flown);
+    Mask out = over & ~f->ratio, first = out & MASK(s->task == 0);
+    if (!any_lane(out)) return;
+    if (params->discs) {
+        Real3 origin = select3(s->place_world, s->entry_world, first);
+        Real3 light = met(params, table, origin, f->d, select((Real)(0.0f), s->t_from, first), (Real)(1e30f), s->density, ~first, 1);
+        add_light(s, times3(light, arrives), out);
+    }
+    if (params->sky) add_light(s, times3(sky_of(params, f->d), arrives), params->sky_visible ? out : out & ~first);
+    if (!(params->sky && params->sky_visible)) s->alpha = select(s->alpha, 1.0f - (arrives.x + arrives.y + arrives.z) * (1.0f / 3.0f), first);
+}
+
+kernel void single_scatter(constant View *view, constant Scattering *params, VOLUME voxels, global const uchar *ranges, global const uchar *rows,
+                           global float *film, global uint *counts) {
+    int number = view->first_beam + (int)get_global_id(0), wide = (view->width + ITEM - 1) / ITEM;
+    if (number >= wide * ((view->height + ITEM - 1) / ITEM)) return;
+    global const float *table = (global const float *)rows;
+    int left = number % wide * ITEM, top = number / wide * ITEM, taken = 0;
+    Sample s;
+    Flight *f = &s.flight;
+    Real zero = (Real)(0.0f);
+    Real3 none = real3(zero, zero, zero);
+    f->p = f->d = f->way = f->inverse = f->carried = s.light = s.entry = s.entry_world = s.d = s.place = s.place_world = s.scattered = none;
+    f->cell.x = f->cell.y = f->cell.z = s.at = s.task = (Int)(0);
+    f->depth = f->left = f->weight = s.alpha = s.length = s.t_from = s.density = zero;
+    f->number = f->event = (UInt)(0u);
+    f->ratio = s.met = (Mask)(0);
+    Mask alive = (Mask)(0);
+    for (;;) {
+        if (taken < ITEM * ITEM && count_lanes(~alive) >= REFILL) {
+            IntLanes free, next;
+            free.v = ~alive;
+            for (int i = 0; i < LANES; i++) next.lane[i] = taken, taken -= free.lane[i];
+            Int column = left + next.v % ITEM, row = top + next.v / ITEM;
+            Mask fresh = ~alive & MASK(next.v < ITEM * ITEM) & MASK(column < view->width) & MASK(row < view->height);
+            if (any_lane(fresh)) begin(view, params, column, row, fresh, &s);
+            alive |= fresh;
+        }
+        if (!any_lane(alive)) {
+            if (taken >= ITEM * ITEM) break;
+            continue;
+        }
+        Mask over;
+        Int face;
+        UInt4Lanes r;
+        Mask real = fly(view, params, voxels, ranges, counts, alive, f, &r, &over, &face);
+        if (any_lane(real)) collide(params, table, real, &s);
+        if (any_lane(over)) arrive(params, table, over, &s);
+        Mask cut = alive & MASK(f->event > MOST_EVENTS), done = cut;
+        if (any_lane(cut)) atomic_add(&counts[COUNT_CUT], (uint)count_lanes(cut));
+        Mask idle = (real | over) & ~cut;
+        if (any_lane(idle)) done |= advance(view, params, voxels, table, idle, &s);
+        if (any_lane(done)) {
+            finish(view, params, film, counts, s.at, done, s.light, s.alpha);
+            alive &= ~done;
+        }
+    }
+}

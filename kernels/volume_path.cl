@@ -1,0 +1,222 @@
+// The radiative transfer equation by paths from the eye: L = sum over scatterings of throughput * (albedo phase) * light, unbiased. At
+// each scattering one light is chosen and aimed at (next-event estimation, its transmittance by a ratio flight), then the path goes on in
+// a direction of the phase function; what it meets there of the sky and of lights that have a size is weighed by the balance
+// heuristic. One work-item is a tile of ITEM x ITEM pixels; a lane whose path has ended takes the next of them.
+
+#if LANES == 1
+#define ITEM 1
+#else
+#define ITEM 16
+#endif
+// Lanes that are free before paths are begun.
+#define REFILL (LANES / 8 + 1)
+
+typedef struct {
+    Flight flight;
+    Int at;                    // the pixel in the film
+    Real3 light;               // what has come to the eye
+    Real alpha;
+    Int scatterings;
+    Real density;              // of the direction in which the path flies, per steradian; 0 on the way from the eye
+    Real t_from;               // where on its way the path's flight begins: before 0 at the eye
+    Real3 from, from_world;    // the last scattering, where the path goes on when a light has been aimed at
+    Real3 next, throughput;
+    Real next_depth;
+} Path;
+
+static inline Real magnitude(Real3 c) { return fmax(fabs(c.x), fmax(fabs(c.y), fabs(c.z))); }
+
+static inline void add_light(Path *path, Real3 light, Mask on) {
+    path->light = select3(path->light, add3(path->light, light), on);
+}
+
+// Begins a path in each lane of `fresh`, at the next pixels of the tile.
+static inline void begin(constant const View *view, constant const Scattering *params, Int column, Int row, Mask fresh, Path *path,
+                         Mask *done) {
+    Flight *f = &path->flight;
+    Real x = to_real(column * view->stride) + view->offset[0], y = to_real(row * view->stride) + view->offset[1];
+    Ray ray = camera_ray(view, x, y);
+    Real3 d = ray_world(view, x, y);
+    Mask meets = MASK(ray.t_far > ray.t_near);
+    Real eye = eye_on_ray(view, x, y), entry = select(eye, ray.t_near, meets);
+    path->at = select(path->at, row * view->width + column, fresh);
+    f->number = as_UInt(select(as_Int(f->number), row * view->stride * view->full_width + column * view->stride, fresh));
+    f->event = as_UInt(select(as_Int(f->event), (Int)(0), fresh));
+    f->p = select3(f->p, along(ray.origin, ray.direction, entry), fresh);
+    f->d = select3(f->d, d, fresh);
+    f->carried = select3(f->carried, real3((Real)(1.0f), (Real)(1.0f), (Real)(1.0f)), fresh);
+    f->weight = select(f->weight, (Real)(1.0f), fresh);
+    f->left = select(f->left, select((Real)(0.0f), (Real)(1e30f), meets), fresh);
+    f->ratio &= ~fresh;
+    UInt4Lanes r = draw(view, f, 1);
+    f->event += as_UInt(select((Int)(0), (Int)(1), fresh));
+    f->depth = select(f->depth, free_depth(r.a), fresh);
+    path->light = select3(path->light, real3((Real)(0.0f), (Real)(0.0f), (Real)(0.0f)), fresh);
+    path->alpha = select(path->alpha, (Real)(1.0f), fresh);
+    path->scatterings = select(path->scatterings, (Int)(0), fresh);
+    path->density = select(path->density, (Real)(0.0f), fresh);
+    path->t_from = select(path->t_from, eye - entry, fresh);
+    path->from_world = select3(path->from_world, world_of(params, f->p), fresh);
+    Mask enters = fresh & meets & MASK(ray.t_near > eye);
+    if (params->index != 1.0f && any_lane(enters)) {
+        Mask back = cross_face(view, 1.0f / params->index, face_at(view, f->p), unit_open(r.b), enters, &f->d);
+        if (params->sky) add_light(path, sky_of(params, f->d), back);
+        f->carried = select3(f->carried, scale3(f->carried, (Real)(1.0f / (params->index * params->index))), enters);
+        *done |= back;
+    }
+    aim(view, params, fresh, f);
+}
+
+// Flights that come to a face from inside: what is reflected stays.
+static inline Mask surface_out(constant const View *view, constant const Scattering *params, Mask out, Int face, Path *path) {
+    Flight *f = &path->flight;
+    Mask back = cross_face(view, params->index, face, unit_open(draw(view, f, 4).a), out, &f->d);
+    f->event += as_UInt(select((Int)(0), (Int)(1), out));
+    f->carried = select3(f->carried, scale3(f->carried, (Real)(params->index * params->index)), out & ~back);
+    return back;
+}
+
+// What the flight of a path has met that shines, up to the length `to`.
+static inline void meet(constant const Scattering *params, global const float *table, Path *path, Real to, Mask on) {
+    if (!params->discs) return;
+    Real3 light = met(params, table, path->from_world, path->flight.d, path->t_from, to, path->density, params->next_event ? MASK(path->density > 0.0f) : (Mask)(0), 0);
+    add_light(path, scale3(times3(light, path->flight.carried), path->flight.weight), on);
+}
+
+// Paths that scatter: light emitted there, a light aimed at, a direction to go on in. Returns those that have ended.
+static inline Mask scatter(constant const View *view, constant const Scattering *params, global const float *table, UInt4Lanes r, Mask real,
+                           Path *path, Mask *elsewhere) {
+    Flight *f = &path->flight;
+    Real3 at = world_of(params, f->p), way = minus3(at, path->from_world);
+    meet(params, table, path, sqrt(dot3(way, way)), real);
+    Real3 arrives = scale3(f->carried, f->weight);
+    add_light(path, real3(arrives.x * params->emission[0], arrives.y * params->emission[1], arrives.z * params->emission[2]), real);
+    path->scatterings += select((Int)(0), (Int)(1), real);
+    Real3 leaves = real3(arrives.x * params->albedo[0], arrives.y * params->albedo[1], arrives.z * params->albedo[2]);
+    Mask ends = real & (MASK(path->scatterings > params->max_scatterings) | MASK(magnitude(leaves) == 0.0f));
+    Mask goes_on = real & ~ends;
+    UInt4Lanes s = draw(view, f, 2);
+    Real u = unit_open(s.d);
+    Mask faint = goes_on & MASK(magnitude(leaves) < params->roulette_threshold);
+    if (any_lane(faint)) {
+        Real chance = magnitude(leaves) / params->roulette_threshold;
+        Mask stays = MASK(u < chance);
+        leaves = select3(leaves, scale3(leaves, 1.0f / chance), faint);
+        u = select(u, fmin(u / chance, (Real)(0.99999994f)), faint); // of those that stay, as random as before
+        ends |= faint & ~stays;
+        goes_on &= ~(faint & ~stays);
+    }
+    if (!any_lane(goes_on)) return ends;
+    Medium m = phase_of(params);
+    Real one_minus, one_plus;
+    sample_phase(table, &m, unit_open(r.a), &one_minus, &one_plus);
+    path->next = select3(path->next, turned(f->d, one_minus, one_plus, unit_open(r.b)), goes_on);
+    path->density = select(path->density, phase_density(table, &m, 1.0f - one_minus), goes_on);
+    path->from = select3(path->from, f->p, goes_on);
+    path->from_world = select3(path->from_world, at, goes_on);
+    path->throughput = select3(path->throughput, leaves, goes_on);
+    path->next_depth = select(path->next_depth, f->depth, goes_on);
+    path->t_from = select(path->t_from, (Real)(0.0f), goes_on);
+    Mask aims = (Mask)(0);
+    if (params->next_event && params->lights > 0) {
+        Int which = choose_light(params, table, unit_open(s.c));
+        Light l = light_of(params, table, which);
+        LightRay ray = light_ray(&l, at, unit_open(s.a), unit_open(s.b));
+        Real density = phase_density(table, &m, clamp(dot3(f->d, ray.d), (Real)(-1.0f), (Real)(1.0f)));
+        Real own = l.chance * ray.density, share = select((Real)(1.0f), own / (own + density), MASK(own > 0.0f));
+        Real3 light = scale3(times3(leaves, ray.light), density * share / l.chance);
+        aims = goes_on & MASK(magnitude(light) > 0.0f);
+        f->carried = select3(f->carried, light, aims);
+        f->d = select3(f->d, ray.d, aims);
+        f->left = select(f->left, ray.length, aims);
+        f->depth = select(f->depth, -log(u), aims);
+        f->ratio |= aims;
+    }
+    Mask straight = goes_on & ~aims;
+    f->carried = select3(f->carried, leaves, straight);
+    f->d = select3(f->d, path->next, straight);
+    f->weight = select(f->weight, (Real)(1.0f), goes_on);
+    *elsewhere |= goes_on;
+    return ends;
+}
+
+// Flights that have come to their end or left the volume. Returns the paths that have ended.
+static inline Mask arrive(constant const View *view, constant const Scattering *params, global const float *table, Mask over, Int face, Path *path,
+                          Mask *elsewhere) {
+    Flight *f = &path->flight;
+    Mask lit = over & f->ratio, out = over & ~f->ratio;
+    if (any_lane(lit)) {
+        add_light(path, scale3(f->carried, f->weight), lit);
+        f->p = select3(f->p, path->from, lit);
+        f->d = select3(f->d, path->next, lit);
+        f->carried = select3(f->carried, path->throughput, lit);
+        f->weight = select(f->weight, (Real)(1.0f), lit);
+        f->depth = select(f->depth, path->next_depth, lit);
+        f->left = select(f->left, (Real)(1e30f), lit);
+        f->ratio &= ~lit;
+        *elsewhere |= lit;
+    }
+    if (params->index != 1.0f && any_lane(out & MASK(face >= 0))) {
+        Mask back = surface_out(view, params, out & MASK(face >= 0), face, path);
+        *elsewhere |= back;
+        out &= ~back;
+    }
+    if (!any_lane(out)) return out;
+    meet(params, table, path, (Real)(1e30f), out);
+    Mask unscattered = out & MASK(path->scatterings == 0);
+    Mask seen = params->sky_visible ? out : out & ~unscattered;
+    if (params->sky) add_light(path, scale3(times3(sky_of(params, f->d), f->carried), f->weight), seen);
+    Real through = f->weight * (f->carried.x + f->carried.y + f->carried.z) * (1.0f / 3.0f);
+    if (!(params->sky && params->sky_visible)) path->alpha = select(path->alpha, 1.0f - through, unscattered);
+    return out;
+}
+
+kernel void volume_path(constant View *view, constant Scattering *params, VOLUME voxels, global const uchar *ranges, global const uchar *rows,
+                        global float *film, global uint *counts) {
+    int number = view->first_beam + (int)get_global_id(0), wide = (view->width + ITEM - 1) / ITEM;
+    if (number >= wide * ((view->height + ITEM - 1) / ITEM)) return;
+    global const float *table = (global const float *)rows;
+    int left = number % wide * ITEM, top = number / wide * ITEM, taken = 0;
+    Path path;
+    Flight *f = &path.flight;
+    Real zero = (Real)(0.0f);
+    Real3 none = real3(zero, zero, zero);
+    f->p = f->d = f->way = f->inverse = f->carried = path.light = path.from = path.from_world = path.next = path.throughput = none;
+    f->cell.x = f->cell.y = f->cell.z = path.at = path.scatterings = (Int)(0);
+    f->depth = f->left = f->weight = path.alpha = path.density = path.t_from = path.next_depth = zero;
+    f->number = f->event = (UInt)(0u);
+    f->ratio = (Mask)(0);
+    Mask alive = (Mask)(0);
+    for (;;) {
+        Mask done = (Mask)(0);
+        if (taken < ITEM * ITEM && count_lanes(~alive) >= REFILL) {
+            IntLanes free, next;
+            free.v = ~alive;
+            for (int i = 0; i < LANES; i++) next.lane[i] = taken, taken -= free.lane[i];
+            Int column = left + next.v % ITEM, row = top + next.v / ITEM;
+            Mask fresh = ~alive & MASK(next.v < ITEM * ITEM) & MASK(column < view->width) & MASK(row < view->height);
+            if (any_lane(fresh)) begin(view, params, column, row, fresh, &path, &done);
+            alive |= fresh;
+        }
+        if (!any_lane(alive)) {
+            if (taken >= ITEM * ITEM) break;
+            continue;
+        }
+        Mask over, elsewhere = (Mask)(0);
+        Int face;
+        UInt4Lanes r;
+        Mask real = fly(view, params, voxels, ranges, counts, alive & ~done, f, &r, &over, &face);
+        if (any_lane(real)) done |= scatter(view, params, table, r, real, &path, &elsewhere);
+        if (any_lane(over)) done |= arrive(view, params, table, over, face, &path, &elsewhere);
+        Mask cut = alive & ~done & MASK(f->event > MOST_EVENTS);
+        if (any_lane(cut)) {
+            atomic_add(&counts[COUNT_CUT], (uint)count_lanes(cut));
+            done |= cut;
+        }
+        if (any_lane(elsewhere & ~done)) aim(view, params, elsewhere & ~done, f);
+        if (any_lane(done)) {
+            finish(view, params, film, counts, path.at, done, path.light, path.alpha);
+            alive &= ~done;
+        }
+    }
+}

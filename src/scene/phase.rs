@@ -1,0 +1,101 @@
+//! Phase functions: how a collision turns light.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::error::{Error, Result};
+
+/// A phase function. Which of the parameters count is said by `type`.
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Phase {
+    /// `isotropic`; `henyey_greenstein` of mean cosine `g`; `two_term_henyey_greenstein`: `weight` of a lobe `g1`, the rest of a lobe
+    /// `g2`; `rayleigh`; `tabulated`: a density over the cosine, linear between its points;
+    /// `klein_nishina`: Compton scattering of gamma photons, with its loss of energy.
+    #[serde(rename = "type")]
+    #[schemars(extend("enum" = ["isotropic", "henyey_greenstein", "two_term_henyey_greenstein", "rayleigh", "tabulated", "klein_nishina"]))]
+    pub kind: String,
+    /// Mean cosine of `henyey_greenstein`.
+    #[schemars(range(min = -1, max = 1))]
+    pub g: f64,
+    /// Mean cosine of the first of two lobes.
+    #[schemars(range(min = -1, max = 1))]
+    pub g1: f64,
+    /// Mean cosine of the second.
+    #[schemars(range(min = -1, max = 1))]
+    pub g2: f64,
+    /// The part of the first.
+    #[schemars(range(min = 0, max = 1))]
+    pub weight: f64,
+    /// `tabulated`: cosines in rising order, from -1 to 1.
+    #[schemars(length(min = 2, max = 512), inner(range(min = -1, max = 1)))]
+    pub cosines: Option<Vec<f64>>,
+    /// `tabulated`: the density at each, of any scale.
+    #[schemars(length(min = 2, max = 512), inner(range(min = 0, max = 1e30)))]
+    pub densities: Option<Vec<f64>>,
+}
+
+impl Default for Phase {
+    fn default() -> Self {
+        let kind = "isotropic".into();
+        Self { kind, g: 0.0, g1: 0.9, g2: -0.3, weight: 0.9, cosines: None, densities: None }
+    }
+}
+
+impl Phase {
+    /// Checks what the schema cannot say.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the field under `at`.
+    pub fn check(&self, at: &str) -> Result<()> {
+        let tabulated = self.kind == "tabulated";
+        for (name, set) in [("cosines", self.cosines.is_some()), ("densities", self.densities.is_some())] {
+            if set != tabulated {
+                let (detail, permitted) =
+                    if set { ("only for tabulated", "leave it out") } else { ("missing", "2 to 512 numbers") };
+                return Err(Error::invalid(format!("{at}/{name}"), detail, permitted));
+            }
+        }
+        let (Some(cosines), Some(densities)) = (&self.cosines, &self.densities) else { return Ok(()) };
+        let rising = cosines.windows(2).all(|w| w[0] < w[1]);
+        if !rising || cosines.first() != Some(&-1.0) || cosines.last() != Some(&1.0) {
+            return Err(Error::invalid(format!("{at}/cosines"), "not a table of all angles", "rising from -1 to 1"));
+        }
+        if densities.len() != cosines.len() || densities.iter().sum::<f64>() <= 0.0 {
+            let permitted = format!("{} numbers, not all of them 0", cosines.len());
+            return Err(Error::invalid(format!("{at}/densities"), "not a density at each cosine", permitted));
+        }
+        Ok(())
+    }
+
+    /// The kernel's kind and its three parameters. Rows of a tabulated one are put behind `rows`, which starts at `rows_at` in
+    /// the kernel's table.
+    pub fn numbers(&self, rows: &mut Vec<f32>, rows_at: usize) -> [f32; 4] {
+        match self.kind.as_str() {
+            "henyey_greenstein" => [0.0, self.g as f32, self.g as f32, 1.0],
+            "two_term_henyey_greenstein" => [0.0, self.g1 as f32, self.g2 as f32, self.weight as f32],
+            "rayleigh" => [1.0, 0.0, 0.0, 1.0],
+            "tabulated" => {
+                let first = rows_at + rows.len();
+                let count = self.tabulate(rows);
+                [2.0, first as f32, count as f32, 1.0]
+            }
+            _ => [0.0, 0.0, 0.0, 1.0],
+        }
+    }
+
+    /// Rows of cosine, normalised density and cumulative probability.
+    fn tabulate(&self, rows: &mut Vec<f32>) -> usize {
+        let (Some(cosines), Some(densities)) = (&self.cosines, &self.densities) else { return 0 };
+        let area = |i: usize| 0.5 * (densities[i] + densities[i - 1]) * (cosines[i] - cosines[i - 1]);
+        let total: f64 = (1..cosines.len()).map(area).sum();
+        let mut below = 0.0;
+        for i in 0..cosines.len() {
+            if i > 0 {
+                below += area(i) / total;
+            }
+            rows.extend([cosines[i] as f32, (densities[i] / total) as f32, below as f32]);
+        }
+        cosines.len()
+    }
+}

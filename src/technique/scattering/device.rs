@@ -1,0 +1,79 @@
+//! What the kernels of scattering views are told.
+
+use crate::device_struct;
+
+device_struct! {
+    /// Their own parameters. Places are in index units, lengths in world units; `at_` says where in the table something starts.
+    pub struct Scattering {
+        /// Column-major map from index to world, three rows and four columns.
+        pub world_from_index: [f32; 12],
+        /// Cells between walls, along each axis.
+        pub walls: [i32; 3],
+        /// Voxels from wall to wall.
+        pub wall_voxels: [f32; 3],
+        /// Walls per voxel; 0 where there is but one cell.
+        pub walls_per_voxel: [f32; 3],
+        /// Whether one majorant stands for the whole volume.
+        pub whole: i32,
+        /// density = raw × scale + offset, from 0 to `density_most`.
+        pub density_scale: f32,
+        /// See `density_scale`.
+        pub density_offset: f32,
+        /// See `density_scale`.
+        pub density_most: f32,
+        /// The density where it is the same everywhere.
+        pub density_box: f32,
+        /// Extinction at a density of 1, by colour.
+        pub sigma_t: [f32; 3],
+        /// The greatest of them.
+        pub sigma_most: f32,
+        /// The three over the greatest.
+        pub colour: [f32; 3],
+        /// Whether they differ.
+        pub chromatic: i32,
+        /// Majorant at a density of 1; of the whole volume where there is but one, or its extinction where it is the same everywhere.
+        pub majorant: f32,
+        /// The march's step.
+        pub march_step: f32,
+        /// What of a collision is scattered, by colour.
+        pub albedo: [f32; 3],
+        /// Radiance emitted per unit of optical depth, by colour.
+        pub emission: [f32; 3],
+        /// Refractive index.
+        pub index: f32,
+        /// Kind and parameters of the phase function, see `kernels/shared/phase.h`.
+        pub phase: [f32; 4],
+        /// Lights besides the sky.
+        pub lights: i32,
+        /// The lights.
+        pub at_lights: i32,
+        /// Whether rays can meet any of them.
+        pub discs: i32,
+        /// Whether there is a sky.
+        pub sky: i32,
+        /// Whether the eye sees it.
+        pub sky_visible: i32,
+        /// Its radiance straight above.
+        pub sky_zenith: [f32; 3],
+        /// At the horizon.
+        pub sky_horizon: [f32; 3],
+        /// Straight below.
+        pub sky_ground: [f32; 3],
+        /// Which way is up.
+        pub sky_up: [f32; 3],
+        /// Whether a ray in any direction may meet light: a sky, lights that have a size, or emission.
+        pub lit_by_chance: i32,
+        /// Whether lights are aimed at.
+        pub next_event: i32,
+        /// A path ends at a collision after so many.
+        pub max_scatterings: i32,
+        /// Light below this meets the roulette.
+        pub roulette_threshold: f32,
+        /// Samples of more luminance than this are scaled to it; 0: none are.
+        pub clamp_luminance: f32,
+        /// Whether places on a ray are also chosen by the angle under which they see a light.
+        pub equiangular: i32,
+        /// The mean extinction.
+        pub sigma_mean: f32,
+    }
+}

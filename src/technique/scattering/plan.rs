@@ -1,0 +1,284 @@
+//! What scattering views have the device run.
+
+use serde_json::{Value, json};
+
+use super::device::Scattering;
+use super::parameters::{Parameters, Tracking};
+use crate::device::cells::CELL;
+use crate::device::program::{Source, Variant};
+use crate::device::structs::{DeviceStruct, View as DeviceView};
+use crate::error::{Error, Result};
+use crate::scene;
+use crate::scene::camera::{Camera, Framing};
+use crate::scene::interpolation::Interpolation;
+use crate::scene::lights::Lights;
+use crate::technique::{CellUse, View, ViewPlan};
+use crate::volume::{Volume, VoxelType};
+
+type Features = [(&'static str, i32); 3];
+
+const fn of(geometry: i32, tracking: i32, interpolation: Interpolation) -> Features {
+    [("GEOMETRY", geometry), ("TRACKING", tracking), ("INTERPOLATION", interpolation.code())]
+}
+
+/// Every set of features that may be built: the box, whose density is the same everywhere, and each tracker through a grid.
+static FEATURES: [Features; 8] = {
+    use Interpolation::{Nearest, Trilinear};
+    [
+        of(1, 2, Trilinear),
+        of(0, 0, Nearest),
+        of(1, 2, Nearest),
+        of(1, 0, Nearest),
+        of(1, 1, Trilinear),
+        of(1, 1, Nearest),
+        of(1, 3, Trilinear),
+        of(1, 3, Nearest),
+    ]
+};
+
+/// Voxels that the mean density is taken of.
+const MEAN_OF: usize = 4096;
+
+pub(in crate::technique) fn source(kernel: &'static str) -> Source {
+    Source {
+        kernel,
+        headers: &[
+            "shared/lanes.h",
+            "shared/rng.h",
+            "shared/camera.h",
+            "shared/voxel.h",
+            "shared/volume.h",
+            "shared/phase.h",
+            "shared/fresnel.h",
+            "shared/walls.h",
+            "shared/film.h",
+            "shared/flight.h",
+            "shared/light.h",
+            "shared/surface.h",
+        ],
+        structs: || {
+            "#pragma OPENCL EXTENSION cl_khr_int64_base_atomics : enable\n".to_owned()
+                + &DeviceView::opencl_text()
+                + &Scattering::opencl_text()
+        },
+        arguments: 7,
+        volume: Some(2),
+        variants: match kernel {
+            "single_scatter" => || variants("single_scatter"),
+            _ => || variants("volume_path"),
+        },
+        common: 1,
+    }
+}
+
+/// The first is a built-in's.
+fn variants(kernel: &'static str) -> Vec<Variant> {
+    let mut types = VoxelType::ALL;
+    types.reverse();
+    let of = |features: &'static Features| types.map(|t| Variant { kernel, voxel: Some(t), features });
+    FEATURES.iter().flat_map(of).collect()
+}
+
+/// A scattering view with valid parameters.
+pub(in crate::technique) struct Scatterer {
+    kernel: &'static str,
+    parameters: Parameters,
+    lights: Lights,
+}
+
+impl Scatterer {
+    /// Checks the parameters of the technique `kernel`.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the field under `at`.
+    pub fn new(kernel: &'static str, parameters: Parameters, at: &str) -> Result<Self> {
+        parameters.check(at)?;
+        let lights = Lights::from_request(parameters.lights.as_deref(), &format!("{at}/lights"))?;
+        if parameters.medium.index != 1.0 && (kernel != "volume_path" || lights.count() > 0) {
+            let detail = "light that is bent at the faces cannot be aimed at";
+            let permitted = "1; in volume_path under a sky alone, 1 to 4";
+            return Err(Error::invalid(format!("{at}/medium/index"), detail, permitted));
+        }
+        if !parameters.next_event
+            && let Some(i) = lights.first_without_size()
+        {
+            let detail = "no path meets a light without size by chance";
+            let permitted = "true, or lights that have a size";
+            let field = if parameters.lights.is_some() { format!("; /lights/{i} has none") } else { String::new() };
+            return Err(Error::invalid(format!("{at}/next_event"), detail.to_owned() + &field, permitted));
+        }
+        Ok(Self { kernel, parameters, lights })
+    }
+
+    /// Whether the density is the same everywhere.
+    fn is_box(volume: &Volume) -> bool {
+        volume.non_finite() == 0 && volume.range()[0] == volume.range()[1]
+    }
+
+    fn features(&self, volume: &Volume) -> (&'static Features, String) {
+        let (p, interpolation) = (&self.parameters, self.parameters.interpolation());
+        let any = matches!(p.tracking, Tracking::Auto | Tracking::Exact);
+        let (wanted, why) = match p.tracking {
+            _ if any && Self::is_box(volume) => {
+                (of(0, 0, Interpolation::Nearest), "exact: from face to face a free path is a closed form")
+            }
+            Tracking::Auto => (of(1, 2, interpolation), "delta: with the majorants of macro-cells"),
+            Tracking::Exact => (of(1, 0, interpolation), "exact, as asked"),
+            Tracking::March => (of(1, 1, interpolation), "march, as asked: biased by up to a step a path"),
+            Tracking::Delta => (of(1, 2, interpolation), "delta, as asked"),
+            Tracking::Weighted => (of(1, 3, interpolation), "weighted, as asked"),
+        };
+        (FEATURES.iter().find(|f| **f == wanted).unwrap_or(&FEATURES[0]), format!("tracking {why}"))
+    }
+
+    fn smallest_voxel(volume: &Volume) -> f64 {
+        volume.spacing().into_iter().fold(f64::INFINITY, f64::min)
+    }
+
+    /// The mean density of a few thousand voxels.
+    fn mean_density(&self, volume: &Volume) -> f64 {
+        let n = volume.voxels().len();
+        let stride = (n / MEAN_OF).max(1) | 1;
+        let density = |i: usize| {
+            let value = f64::from(volume.voxels().get_f32(i)) * volume.slope() + volume.inter();
+            if value.is_finite() { self.parameters.medium.density_of(value) } else { 0.0 }
+        };
+        let count = n.div_ceil(stride) as f64;
+        (0..n).step_by(stride).map(density).sum::<f64>() / count
+    }
+
+    /// Walls, and what a free path is drawn with between them.
+    fn walls(&self, volume: &Volume, features: &Features, greatest_sigma: f64, device: &mut Scattering) {
+        let (geometry, tracking) = (features[0].1, features[1].1);
+        let p = &self.parameters;
+        let local = geometry == 1 && tracking >= 2 && p.majorant.grid == "local";
+        let side = match (geometry, tracking) {
+            (1, 0) => Some(1),
+            _ if local => Some(CELL),
+            _ => None,
+        };
+        for a in 0..3 {
+            let n = volume.dims()[a];
+            device.walls[a] = side.map_or(1, |s| n.div_ceil(s) as i32);
+            device.wall_voxels[a] = side.unwrap_or(n) as f32;
+            device.walls_per_voxel[a] = if device.walls[a] > 1 { 1.0 / device.wall_voxels[a] } else { 0.0 };
+        }
+        let scale = if geometry == 0 { 1.0 } else { p.majorant.scale };
+        device.whole = i32::from(!local);
+        let density = if local { 1.0 } else { p.medium.greatest_density(volume) };
+        device.majorant = (greatest_sigma * scale * density) as f32;
+    }
+
+    fn sky(&self, volume: &Volume, device: &mut Scattering) {
+        let Some(sky) = self.lights.sky() else { return };
+        let [zenith, horizon, ground] = sky.radiance.map(|c| c.map(|v| v as f32));
+        (device.sky_zenith, device.sky_horizon, device.sky_ground) = (zenith, horizon, ground);
+        (device.sky, device.sky_visible) = (1, i32::from(sky.visible));
+        device.sky_up = sky.up.unwrap_or_else(|| Framing::from(volume).up()).as_vec3().to_array();
+    }
+}
+
+impl View for Scatterer {
+    fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
+        let (features, why) = self.features(volume);
+        let variant = Variant { kernel: self.kernel, voxel: Some(volume.voxel_type()), features };
+        let sigma = self.parameters.medium.sigma_t_per_unit(volume);
+        Ok(ViewPlan {
+            variant,
+            cells: CellUse::Ranges,
+            step: (CELL as f64 * Self::smallest_voxel(volume)) as f32,
+            stepless: true,
+            opacity_threshold: 1.0,
+            reasons: vec![why, format!("sigma_t_per_unit: {:.6}, {:.6}, {:.6}", sigma[0], sigma[1], sigma[2])],
+        })
+    }
+
+    fn parameters(&self, volume: &Volume, _camera: &Camera) -> Result<Vec<u8>> {
+        let (p, m) = (&self.parameters, &self.parameters.medium);
+        let (features, _) = self.features(volume);
+        let sigma = m.sigma_t_per_unit(volume);
+        let most = sigma.into_iter().fold(0.0, f64::max);
+        let [scale, offset, density_most] = m.density();
+        let world_from_index = volume.world_from_index();
+        let emission = m.emission.rgb();
+        let phase = m.phase.numbers(&mut Vec::new(), self.lights.count() * scene::lights::LIGHT_NUMBERS);
+        let mut device = Scattering {
+            world_from_index: std::array::from_fn(|i| world_from_index.to_cols_array()[i] as f32),
+            density_scale: (scale * volume.slope()) as f32,
+            density_offset: (scale * volume.inter() + offset) as f32,
+            density_most: density_most as f32,
+            density_box: m.greatest_density(volume) as f32,
+            sigma_t: sigma.map(|v| v as f32),
+            sigma_most: most as f32,
+            colour: sigma.map(|v| if most > 0.0 { (v / most) as f32 } else { 1.0 }),
+            chromatic: i32::from(sigma.iter().any(|v| *v != sigma[0])),
+            march_step: (p.march_step_voxels * Self::smallest_voxel(volume)) as f32,
+            albedo: m.albedo.rgb().map(|v| v as f32),
+            emission: std::array::from_fn(|i| if sigma[i] > 0.0 { (emission[i] / sigma[i]) as f32 } else { 0.0 }),
+            index: m.index as f32,
+            phase,
+            lights: self.lights.count() as i32,
+            discs: i32::from(self.lights.any_with_size()),
+            lit_by_chance: i32::from(
+                self.lights.any_with_size() || self.lights.sky().is_some() || emission.iter().any(|e| *e > 0.0),
+            ),
+            next_event: i32::from(p.next_event),
+            max_scatterings: p.max_scatterings.map_or(i32::MAX, |n| n as i32),
+            roulette_threshold: p.roulette_threshold as f32,
+            clamp_luminance: p.clamp_luminance.unwrap_or(0.0) as f32,
+            equiangular: i32::from(p.equiangular),
+            sigma_mean: (most * self.mean_density(volume)) as f32,
+            ..Scattering::default()
+        };
+        self.walls(volume, features, most, &mut device);
+        self.sky(volume, &mut device);
+        Ok(bytemuck::bytes_of(&device).to_vec())
+    }
+
+    /// The lights, then the rows of a tabulated phase function.
+    fn table(&self, volume: &Volume, _step: f32) -> Result<Vec<u32>> {
+        let mut table = self.lights.table(scene::radius(volume), Framing::from(volume).up());
+        let mut rows = Vec::new();
+        self.parameters.medium.phase.numbers(&mut rows, table.len());
+        table.extend(rows);
+        Ok(table.into_iter().map(f32::to_bits).collect())
+    }
+
+    fn clips(&self) -> bool {
+        false
+    }
+
+    fn tile(&self) -> Option<usize> {
+        Some(16)
+    }
+
+    fn least_samples(&self) -> u32 {
+        LEAST_SAMPLES
+    }
+
+    fn warnings(&self, volume: &Volume) -> Vec<Value> {
+        let mut warnings = Vec::new();
+        let mut warn = |code: &str, message: &str, measured: f64, bound: f64| {
+            warnings.push(json!({"code": code, "message": message, "measured": measured, "bound": bound}));
+        };
+        let least = volume.range()[0];
+        if self.parameters.medium.density_window.is_none() && least < 0.0 {
+            warn("negative_density", "values below 0 are rendered as empty; give medium a density_window", least, 0.0);
+        }
+        let tracked = matches!(self.parameters.tracking, Tracking::Delta | Tracking::Auto);
+        if tracked && self.parameters.majorant.scale < 1.0 && !Self::is_box(volume) {
+            warn("broken_majorant", "majorants are below the extinction: biased", self.parameters.majorant.scale, 1.0);
+        }
+        if self.parameters.tracking == Tracking::March {
+            let depth = self.parameters.march_step_voxels * Self::smallest_voxel(volume);
+            let sigma = self.parameters.medium.sigma_t_per_unit(volume).into_iter().fold(0.0, f64::max);
+            let h = depth * sigma * self.parameters.medium.greatest_density(volume);
+            let message = "the march's free paths are whole steps: where it is densest they are too long by this part";
+            warn("march_bias", message, if h > 0.0 { h / -(-h).exp_m1() - 1.0 } else { 0.0 }, 0.0);
+        }
+        warnings
+    }
+}
+
+/// A render does not stop for its error before every pixel has so many samples: of fewer the error itself is not known.
+const LEAST_SAMPLES: u32 = 16;

@@ -1,0 +1,67 @@
+//! # `volume_path`
+//!
+//! The full radiative transfer equation by unbiased paths from the eye: the volume's values are densities, extinction
+//! σ(x) = density(x) · `sigma_t_per_unit`, and
+//! L(x, ω) = ∫ T(x, y) σ(y) [ε/σ + albedo ∫ p(ω', ω) L(y, ω') dω'] dy + T L_sky (Chandrasekhar, "Radiative Transfer", 1950).
+//! Free paths by delta tracking (Woodcock 1965), transmittances by ratio tracking (Novák, Selle, Jarosz 2014), next-event estimation
+//! towards one light a scattering, weighed against what the phase function finds by the balance heuristic (Veach & Guibas 1995); colours of
+//! different extinction by spectral tracking (Kutz et al. 2017).
+//!
+//! | parameter | unit | range | default |
+//! |---|---|---|---|
+//! | `medium` | | `sigma_t_per_unit`, `albedo`, `phase`, `emission`, `index`, `density_window` | depth 10, 0.9, isotropic |
+//! | `lights` | | `sun`, `sky`, `point`, `sphere`, `quad` | a sun in a blue sky |
+//! | `interpolation` | | `trilinear`, `nearest` | `trilinear` |
+//! | `tracking` | | `auto`, `exact` (nearest), `march` (biased), `delta`, `weighted` | `auto` |
+//! | `majorant` | | `local` or `global`, times a scale | local, 1 |
+//! | `march_step_voxels` | smallest voxel side | 0.01–16 | 1 |
+//! | `max_scatterings` | | 0–10⁶ | none |
+//! | `next_event` | | | true |
+//! | `roulette_threshold` | | 0–1 | 0.25 |
+//! | `clamp_luminance` | | | none |
+//!
+//! Example: see [`example`], which a test runs.
+
+use std::sync::Arc;
+
+use serde_json::{Value, json};
+
+use super::scattering::{self, Parameters, Scatterer};
+use super::{Kind, Technique, View};
+use crate::device::program::Source;
+use crate::error::Result;
+use crate::request;
+
+/// The technique's line in the list.
+pub const TECHNIQUE: Technique = Technique {
+    name: "volume_path",
+    summary: "Light scattered any number of times: unbiased paths through the volume as a medium",
+    schema,
+    example,
+    source,
+    kind: Kind::View(parse),
+};
+
+fn schema() -> Value {
+    request::schema_without::<Parameters>(&["equiangular"])
+}
+
+/// A request that works as it is.
+pub fn example() -> Value {
+    json!({
+        "technique": "volume_path",
+        "volume": {"builtin": "smoke", "resolution": 64},
+        "image": {"width": 128, "height": 128},
+        "budget": {"samples": 16},
+        "volume_path": {"medium": {"sigma_t_per_unit": 12, "albedo": 0.95, "phase": {"type": "henyey_greenstein", "g": 0.5}}}
+    })
+}
+
+fn source() -> Source {
+    scattering::source(TECHNIQUE.name)
+}
+
+fn parse(parameters: &Value, at: &str) -> Result<Arc<dyn View>> {
+    let parameters: Parameters = request::parse(parameters, &schema(), at)?;
+    Ok(Arc::new(Scatterer::new(TECHNIQUE.name, parameters, at)?))
+}
