@@ -5,13 +5,6 @@
 // The free flight's density is known only on average, e = sigma exp(-sigma t); any weights that sum to 1 leave the mean as it is.
 // One work-item is a tile of ITEM x ITEM pixels; a lane that is through with its sample takes the next of them.
 
-#if LANES == 1
-#define ITEM 1
-#else
-#define ITEM 16
-#endif
-#define REFILL (LANES / 8 + 1)
-
 // What a lane is at: 0 the way from the eye; 1 .. lights a light seen from the collision; then the sky; then for each light the way
 // from the eye to a place chosen by angle, and from there to the light.
 typedef struct {
@@ -31,7 +24,8 @@ static inline void add_light(Sample *s, Real3 light, Mask on) { s->light = selec
 
 static inline void begin(constant const View *view, constant const Scattering *params, Int column, Int row, Mask fresh, Sample *s) {
     Flight *f = &s->flight;
-    Real x = to_real(column * view->stride) + view->offset[0], y = to_real(row * view->stride) + view->offset[1];
+    float2 place = place_in_pixel(f->sample);
+    Real x = to_real(column * view->stride) + place.x, y = to_real(row * view->stride) + place.y;
     Ray ray = camera_ray(view, x, y);
     Mask meets = MASK(ray.t_far > ray.t_near);
     Real eye = eye_on_ray(view, x, y), entry = select(eye, ray.t_near, meets);
@@ -231,11 +225,9 @@ static inline void arrive(constant const Scattering *params, global const float 
 }
 
 kernel void single_scatter(constant View *view, constant Scattering *params, VOLUME voxels, global const uchar *ranges, global const uchar *rows,
-                           global float *film, global uint *counts) {
-    int number = view->first_beam + (int)get_global_id(0), wide = (view->width + ITEM - 1) / ITEM;
-    if (number >= wide * ((view->height + ITEM - 1) / ITEM)) return;
+                           global float *film, global uint *counts, global const uint *tiles) {
+    Tile tile = tile_at(view, tiles);
     global const float *table = (global const float *)rows;
-    int left = number % wide * ITEM, top = number / wide * ITEM, taken = 0;
     Sample s;
     Flight *f = &s.flight;
     Real zero = (Real)(0.0f);
@@ -246,18 +238,17 @@ kernel void single_scatter(constant View *view, constant Scattering *params, VOL
     f->number = f->event = (UInt)(0u);
     f->ratio = s.met = (Mask)(0);
     Mask alive = (Mask)(0);
-    for (;;) {
+    int taken = 0;
+    f->sample = tile.sample;
+    while (f->sample < tile.sample + tile.times) {
         if (taken < ITEM * ITEM && count_lanes(~alive) >= REFILL) {
-            IntLanes free, next;
-            free.v = ~alive;
-            for (int i = 0; i < LANES; i++) next.lane[i] = taken, taken -= free.lane[i];
-            Int column = left + next.v % ITEM, row = top + next.v / ITEM;
-            Mask fresh = ~alive & MASK(next.v < ITEM * ITEM) & MASK(column < view->width) & MASK(row < view->height);
+            Int column, row;
+            Mask fresh = take_pixels(view, tile, alive, &taken, &column, &row);
             if (any_lane(fresh)) begin(view, params, column, row, fresh, &s);
             alive |= fresh;
         }
         if (!any_lane(alive)) {
-            if (taken >= ITEM * ITEM) break;
+            if (taken >= ITEM * ITEM) taken = 0, f->sample++;
             continue;
         }
         Mask over;
@@ -271,7 +262,7 @@ kernel void single_scatter(constant View *view, constant Scattering *params, VOL
         Mask idle = (real | over) & ~cut;
         if (any_lane(idle)) done |= advance(view, params, voxels, table, idle, &s);
         if (any_lane(done)) {
-            finish(view, params, film, counts, s.at, done, s.light, s.alpha);
+            finish(view, params, film, counts, f->sample, s.at, done, s.light, s.alpha);
             alive &= ~done;
         }
     }

@@ -3,14 +3,6 @@
 // a direction of the phase function; what it meets there of the sky and of lights that have a size is weighed by the balance
 // heuristic. One work-item is a tile of ITEM x ITEM pixels; a lane whose path has ended takes the next of them.
 
-#if LANES == 1
-#define ITEM 1
-#else
-#define ITEM 16
-#endif
-// Lanes that are free before paths are begun.
-#define REFILL (LANES / 8 + 1)
-
 typedef struct {
     Flight flight;
     Int at;                    // the pixel in the film
@@ -34,7 +26,8 @@ static inline void add_light(Path *path, Real3 light, Mask on) {
 static inline void begin(constant const View *view, constant const Scattering *params, Int column, Int row, Mask fresh, Path *path,
                          Mask *done) {
     Flight *f = &path->flight;
-    Real x = to_real(column * view->stride) + view->offset[0], y = to_real(row * view->stride) + view->offset[1];
+    float2 place = place_in_pixel(f->sample);
+    Real x = to_real(column * view->stride) + place.x, y = to_real(row * view->stride) + place.y;
     Ray ray = camera_ray(view, x, y);
     Real3 d = ray_world(view, x, y);
     Mask meets = MASK(ray.t_far > ray.t_near);
@@ -172,11 +165,9 @@ static inline Mask arrive(constant const View *view, constant const Scattering *
 }
 
 kernel void volume_path(constant View *view, constant Scattering *params, VOLUME voxels, global const uchar *ranges, global const uchar *rows,
-                        global float *film, global uint *counts) {
-    int number = view->first_beam + (int)get_global_id(0), wide = (view->width + ITEM - 1) / ITEM;
-    if (number >= wide * ((view->height + ITEM - 1) / ITEM)) return;
+                        global float *film, global uint *counts, global const uint *tiles) {
+    Tile tile = tile_at(view, tiles);
     global const float *table = (global const float *)rows;
-    int left = number % wide * ITEM, top = number / wide * ITEM, taken = 0;
     Path path;
     Flight *f = &path.flight;
     Real zero = (Real)(0.0f);
@@ -187,19 +178,18 @@ kernel void volume_path(constant View *view, constant Scattering *params, VOLUME
     f->number = f->event = (UInt)(0u);
     f->ratio = (Mask)(0);
     Mask alive = (Mask)(0);
-    for (;;) {
+    int taken = 0;
+    f->sample = tile.sample;
+    while (f->sample < tile.sample + tile.times) {
         Mask done = (Mask)(0);
         if (taken < ITEM * ITEM && count_lanes(~alive) >= REFILL) {
-            IntLanes free, next;
-            free.v = ~alive;
-            for (int i = 0; i < LANES; i++) next.lane[i] = taken, taken -= free.lane[i];
-            Int column = left + next.v % ITEM, row = top + next.v / ITEM;
-            Mask fresh = ~alive & MASK(next.v < ITEM * ITEM) & MASK(column < view->width) & MASK(row < view->height);
+            Int column, row;
+            Mask fresh = take_pixels(view, tile, alive, &taken, &column, &row);
             if (any_lane(fresh)) begin(view, params, column, row, fresh, &path, &done);
             alive |= fresh;
         }
         if (!any_lane(alive)) {
-            if (taken >= ITEM * ITEM) break;
+            if (taken >= ITEM * ITEM) taken = 0, f->sample++;
             continue;
         }
         Mask over, elsewhere = (Mask)(0);
@@ -215,7 +205,7 @@ kernel void volume_path(constant View *view, constant Scattering *params, VOLUME
         }
         if (any_lane(elsewhere & ~done)) aim(view, params, elsewhere & ~done, f);
         if (any_lane(done)) {
-            finish(view, params, film, counts, path.at, done, path.light, path.alpha);
+            finish(view, params, film, counts, f->sample, path.at, done, path.light, path.alpha);
             alive &= ~done;
         }
     }

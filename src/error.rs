@@ -105,6 +105,14 @@ impl Error {
         Self::Invalid(vec![Violation::new(pointer, detail, permitted)])
     }
 
+    /// The same with other pointers, for those that `other` gives one for.
+    #[must_use]
+    pub fn with_pointers(self, other: impl Fn(&str) -> Option<String>) -> Self {
+        let Self::Invalid(violations) = self else { return self };
+        let moved = |v: Violation| Violation { pointer: other(&v.pointer).unwrap_or(v.pointer), ..v };
+        Self::Invalid(violations.into_iter().map(moved).collect())
+    }
+
     /// An [`Error::Internal`] from anything that prints.
     pub fn internal(cause: impl fmt::Display) -> Self {
         Self::Internal(cause.to_string())

@@ -1,5 +1,6 @@
 //! The film on the host: what a view has gathered so far, its estimated error, and the picture of it.
 
+pub mod difference;
 pub mod picture;
 
 use serde::Serialize;
@@ -19,8 +20,28 @@ pub struct Samples {
     pub count: u32,
     /// Mean linear R, G, B and alpha of every pixel.
     pub mean: Vec<f32>,
-    /// Sum of squared deviations of the luminance of every pixel.
+    /// Sum of squared deviations of the luminance of every pixel; NaN where a sample was not finite.
     pub m2: Vec<f32>,
+    /// Samples by tile, where they were put where the error is.
+    pub tiles: Option<Tiles>,
+}
+
+/// How often each tile of a picture was sampled.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Tiles {
+    /// Pixels along a tile's side.
+    pub side: usize,
+    /// Tiles across.
+    pub wide: usize,
+    /// Samples of each pixel of a tile, row by row.
+    pub counts: Vec<u32>,
+}
+
+impl Tiles {
+    /// Samples of the pixel (x, y).
+    pub fn count_at(&self, x: usize, y: usize) -> u32 {
+        self.counts[y / self.side * self.wide + x / self.side]
+    }
 }
 
 /// The luminance of linear sRGB (ITU-R BT.709), `luminance` of the kernel.
@@ -37,9 +58,45 @@ impl Samples {
         self.width * self.height
     }
 
-    /// Variance of one sample of a pixel's luminance; 0 where there is but one.
+    /// Samples of a pixel.
+    fn count_at(&self, pixel: usize) -> u32 {
+        match &self.tiles {
+            Some(tiles) => tiles.count_at(pixel % self.width, pixel / self.width),
+            None => self.count,
+        }
+    }
+
+    /// Variance of one sample of a pixel's luminance; 0 where there is but one, NaN where a sample was not finite.
+    fn known_variance(&self, pixel: usize) -> f64 {
+        let count = self.count_at(pixel);
+        if count < 2 { 0.0 } else { f64::from(self.m2[pixel]) / f64::from(count - 1) }
+    }
+
+    /// The same, 0 where it is not known.
     fn variance(&self, pixel: usize) -> f64 {
-        if self.count < 2 { 0.0 } else { f64::from(self.m2[pixel]) / f64::from(self.count - 1) }
+        Some(self.known_variance(pixel)).filter(|v| v.is_finite()).unwrap_or(0.0)
+    }
+
+    /// The square of the standard error of a pixel's luminance; NaN where a sample was not finite.
+    fn squared_error(&self, pixel: usize) -> f64 {
+        self.known_variance(pixel) / f64::from(self.count_at(pixel).max(1))
+    }
+
+    /// The deviation of the samples of each tile of `side` × `side` pixels, row by row: the root of their mean variance.
+    pub fn deviations(&self, side: usize) -> Vec<f64> {
+        let (wide, high) = (self.width.div_ceil(side), self.height.div_ceil(side));
+        let (mut sums, mut pixels) = (vec![0.0; wide * high], vec![0.0; wide * high]);
+        for i in 0..self.pixels() {
+            let tile = i / self.width / side * wide + i % self.width / side;
+            sums[tile] += self.variance(i);
+            pixels[tile] += 1.0;
+        }
+        sums.iter().zip(pixels).map(|(s, n): (&f64, f64)| (s / n.max(1.0)).sqrt()).collect()
+    }
+
+    /// Pixels of which a sample was not finite.
+    pub fn unknown_pixels(&self) -> usize {
+        self.m2.iter().filter(|v| !v.is_finite()).count()
     }
 
     fn mean_luminance(&self) -> f64 {
@@ -107,10 +164,9 @@ impl Film {
     pub fn error(&self) -> ErrorEstimate {
         let mean = self.main.mean_luminance();
         let relative = |absolute: f64| if mean > 0.0 { absolute / mean } else { absolute };
-        let n = f64::from(self.main.count.max(1));
         let pixels = self.main.pixels().max(1) as f64;
-        let noise = (self.main.count >= 2)
-            .then(|| ((0..self.main.pixels()).map(|i| self.main.variance(i)).sum::<f64>() / n / pixels).sqrt());
+        let squared = |i: usize| Some(self.main.squared_error(i)).filter(|e| e.is_finite()).unwrap_or(0.0);
+        let noise = (self.main.count >= 2).then(|| ((0..self.main.pixels()).map(squared).sum::<f64>() / pixels).sqrt());
         let truncation = self.truncation();
         let (discretisation, joint) = match (&self.control, self.main.stride) {
             (Some(control), 1) => self.against(control),
@@ -183,7 +239,7 @@ impl Film {
 
     /// The luminance of all samples together.
     pub fn luminance_sum(&self) -> f64 {
-        self.main.mean_luminance() * self.main.pixels() as f64 * f64::from(self.main.count)
+        (0..self.main.pixels()).map(|i| self.main.luminance(i) * f64::from(self.main.count_at(i))).sum()
     }
 
     /// Bytes held.
@@ -200,7 +256,8 @@ mod tests {
     fn samples(stride: usize, count: u32, luminances: &[f32], m2: f32) -> Samples {
         let mean = luminances.iter().flat_map(|&l| [l, l, l, 0.5]).collect();
         let width = 2;
-        Samples { width, height: luminances.len() / width, stride, count, mean, m2: vec![m2; luminances.len()] }
+        let height = luminances.len() / width;
+        Samples { width, height, stride, count, mean, m2: vec![m2; luminances.len()], tiles: None }
     }
 
     #[test]
@@ -215,8 +272,15 @@ mod tests {
     #[test]
     fn the_control_tells_discretisation_from_noise() {
         let main = samples(1, 100, &[0.5; 4], 0.0);
-        let control =
-            Samples { width: 1, height: 1, stride: 2, count: 1, mean: vec![0.6, 0.6, 0.6, 0.5], m2: vec![0.0] };
+        let control = Samples {
+            width: 1,
+            height: 1,
+            stride: 2,
+            count: 1,
+            mean: vec![0.6, 0.6, 0.6, 0.5],
+            m2: vec![0.0],
+            tiles: None,
+        };
         let film = Film { size: [2, 2], main, control: Some(control), opacity_threshold: 1.0, ..Film::default() };
         let error = film.error();
         assert!(

@@ -26,18 +26,24 @@ pub fn png([width, height]: [usize; 2], picture: &[u8], description: String) -> 
     Ok(bytes)
 }
 
-/// Linear RGB, or RGB and alpha, in 32-bit floats as OpenEXR; `description` goes into its comments.
+/// Linear RGB, or RGB and alpha, in 32-bit floats as OpenEXR, with a channel `standard_error` of the luminance where it is given;
+/// `description` goes into its comments.
 ///
 /// # Errors
 /// [`Error::Internal`] when the encoder fails.
-pub fn exr([width, height]: [usize; 2], picture: &[f32], description: &str) -> Result<Vec<u8>> {
+pub fn exr(
+    [width, height]: [usize; 2],
+    picture: &[f32],
+    errors: Option<Vec<f32>>,
+    description: &str,
+) -> Result<Vec<u8>> {
     let count = picture.len() / (width * height).max(1);
     let channel = |name: &str, c: usize| {
         AnyChannel::new(name, FlatSamples::F32(picture.iter().skip(c).step_by(count).copied().collect()))
     };
-    let channels = AnyChannels::sort(
-        ["R", "G", "B", "A"].iter().take(count).enumerate().map(|(c, name)| channel(name, c)).collect(),
-    );
+    let colours = ["R", "G", "B", "A"].iter().take(count).enumerate().map(|(c, name)| channel(name, c));
+    let errors = errors.map(|e| AnyChannel::new("standard_error", FlatSamples::F32(e)));
+    let channels = AnyChannels::sort(colours.chain(errors).collect());
     let mut attributes = LayerAttributes::named("cloudchamber");
     attributes.comments = exr::prelude::Text::new_or_none(description);
     let layer = Layer::new((width, height), attributes, Encoding::FAST_LOSSLESS, channels);

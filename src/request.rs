@@ -31,6 +31,10 @@ pub struct RenderRequest {
     pub clip: Option<ClipRequest>,
     /// When to stop: whichever is reached first. Default: the technique's own number of samples.
     pub budget: Option<BudgetRequest>,
+    /// What the volume is made of, for techniques that scatter light: in place of their own `medium`, so that one scene serves them all.
+    pub medium: Option<Value>,
+    /// The lights of such a technique, in place of its own `lights`.
+    pub lights: Option<Value>,
     /// Keys every random number of the render.
     #[schemars(range(min = 0, max = 9_007_199_254_740_991u64))]
     pub seed: Option<u64>,

@@ -8,5 +8,7 @@ mod common;
 mod agreement;
 #[path = "volume_path/extremes.rs"]
 mod extremes;
+#[path = "volume_path/stopping.rs"]
+mod stopping;
 #[path = "volume_path/truth.rs"]
 mod truth;

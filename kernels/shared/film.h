@@ -1,18 +1,20 @@
 // The film: per pixel the mean of linear RGB and alpha over the samples, and M2, the sum of squared deviations of
 // the luminance (Welford, "Note on a method for calculating corrected sums of squares and products", Technometrics 4,
-// 1962: sums and sums of squares that do not cancel). Layout: 4 floats a pixel, then one M2 a pixel.
+// 1962: sums and sums of squares that do not cancel). Layout: 4 floats a pixel, then one M2 a pixel. A sample that is not finite is
+// taken as black and counted, and its pixel's M2 is no number from then on: its error is not known.
 
 #define COUNT_NON_FINITE 0
 
 static inline float luminance(float4 c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
 
 static inline void film_add(global float *film, global uint *counts, int pixel, int pixels, int sample, float4 colour) {
+    float4 mean = sample ? vload4(pixel, film) : (float4)(0.0f);
+    float m2 = sample ? film[4 * pixels + pixel] : 0.0f;
     if (!(isfinite(colour.x) && isfinite(colour.y) && isfinite(colour.z) && isfinite(colour.w))) {
         atomic_inc(&counts[COUNT_NON_FINITE]);
         colour = (float4)(0.0f);
+        m2 = NAN;
     }
-    float4 mean = sample ? vload4(pixel, film) : (float4)(0.0f);
-    float m2 = sample ? film[4 * pixels + pixel] : 0.0f;
     float before = luminance(colour) - luminance(mean);
     mean += (colour - mean) / (float)(sample + 1);
     m2 += before * (luminance(colour) - luminance(mean));

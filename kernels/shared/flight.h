@@ -28,12 +28,13 @@ typedef struct {
     Real3 carried;       // light, or what of it gets to the eye
     Real weight;         // what the flight makes of it
     Mask ratio;
-    UInt number, event;  // key the random numbers: the pixel, and what has happened on its path
+    uint sample;         // keys the random numbers, with
+    UInt number, event;  // the pixel, and what has happened on its path
 } Flight;
 
 // Four numbers of a path's next event; `what` tells the draws of one event apart.
 static inline UInt4Lanes draw(constant const View *view, const Flight *f, uint what) {
-    UInt4Lanes ctr = {f->number, (UInt)((uint)view->sample), f->event, (UInt)(view->stream + 0x6c696700u + 16u * what)};
+    UInt4Lanes ctr = {f->number, (UInt)(f->sample), f->event, (UInt)(view->stream + 0x6c696700u + 16u * what)};
     return philox(ctr, view->seed[0], view->seed[1]);
 }
 
@@ -218,17 +219,16 @@ static inline Mask fly(constant const View *view, constant const Scattering *par
 #endif
 }
 
-// A sample is a firefly if it is further than ten standard deviations above what its pixel has had so far: of noise that dies away as it
-// should there are hardly any.
+// A sample is a firefly if it brings more than twice the light of all that its pixel has had before.
 #define FIREFLY_FROM 16
-static inline int firefly(global const float *film, int pixel, int pixels, int samples, float4 colour) {
-    float mean = luminance(vload4(pixel, film)), variance = film[4 * pixels + pixel] / (float)(samples - 1), above = luminance(colour) - mean;
-    return mean > 0.0f && above > 0.0f && above * above > 100.0f * variance;
+static inline int firefly(global const float *film, int pixel, int samples, float4 colour) {
+    float mean = luminance(vload4(pixel, film));
+    return mean > 0.0f && luminance(colour) > 2.0f * (float)samples * mean;
 }
 
 // The film's part of the paths in `done`: the next sample of their pixels.
-static inline void finish(constant const View *view, constant const Scattering *params, global float *film, global uint *counts, Int at,
-                          Mask done, Real3 light, Real alpha) {
+static inline void finish(constant const View *view, constant const Scattering *params, global float *film, global uint *counts, uint sample,
+                          Int at, Mask done, Real3 light, Real alpha) {
     RealLanes red, green, blue, opacity;
     IntLanes pixel, on;
     if (params->clamp_luminance > 0.0f) {
@@ -249,7 +249,7 @@ static inline void finish(constant const View *view, constant const Scattering *
     for (int i = 0; i < LANES; i++) {
         if (!on.lane[i]) continue;
         float4 colour = (float4)(red.lane[i], green.lane[i], blue.lane[i], opacity.lane[i]);
-        if (view->sample >= FIREFLY_FROM && firefly(film, pixel.lane[i], pixels, view->sample, colour)) atomic_inc(&counts[COUNT_FIREFLIES]);
-        film_add(film, counts, pixel.lane[i], pixels, view->sample, colour);
+        if (sample >= FIREFLY_FROM && firefly(film, pixel.lane[i], (int)sample, colour)) atomic_inc(&counts[COUNT_FIREFLIES]);
+        film_add(film, counts, pixel.lane[i], pixels, (int)sample, colour);
     }
 }

@@ -44,7 +44,8 @@ impl Film {
         Ok((frame::png(self.size, &bytes, self.description(&error))?, error, clipped))
     }
 
-    /// The film as OpenEXR bytes; a transparent one has an alpha channel and is premultiplied, as is usual there.
+    /// The film as OpenEXR bytes; a transparent one has an alpha channel and is premultiplied, as is usual there. Of two samples or more
+    /// each pixel says the standard error of its luminance, or that it is no number where a sample was not finite.
     ///
     /// # Errors
     /// `Error::Internal` when the encoder fails.
@@ -53,7 +54,9 @@ impl Film {
             Background::Colour(behind) => self.rgba().chunks_exact(4).flat_map(|p| over(p, behind)).collect(),
             Background::Transparent => self.rgba().into_owned(),
         };
-        frame::exr(self.size, &picture, &self.description(error))
+        let known = self.main.stride == 1 && self.main.count >= 2;
+        let errors = known.then(|| (0..self.main.m2.len()).map(|i| self.main.squared_error(i).sqrt() as f32).collect());
+        frame::exr(self.size, &picture, errors, &self.description(error))
     }
 
     /// The samples in linear R, G, B (premultiplied) and alpha, row by row from the top; a preview is interpolated to the full

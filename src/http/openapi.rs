@@ -100,6 +100,12 @@ const OPERATIONS: &[Operation] = &[
         &[404, 409, 422, 429],
     ),
     get(
+        "/v1/renders/{id}/difference",
+        "Whether this render and ?with=… are of the same picture: a map of z, with X-Cloudchamber-{P-Value,Pixels-Beyond,Agree}",
+        &[(200, "image/png", "White: the same; red and blue: beyond noise"), (200, JSON, "The same in numbers")],
+        &[404, 406, 409, 422],
+    ),
+    get(
         "/v1/renders/{id}/field",
         "The grid of a field technique as NRRD",
         &[(200, "application/octet-stream", "NRRD, raw floats")],
@@ -165,6 +171,9 @@ fn describe(operation: &Operation) -> Value {
     let mut query = |name: &str, schema: Value| parameters.push(json!({"name": name, "in": "query", "schema": schema}));
     if operation.path.contains("/frame.") {
         query("wait", json!({"enum": ["final"]}));
+    }
+    if operation.path.ends_with("/difference") {
+        query("with", json!({"type": "string"}));
     }
     match operation.body {
         Body::None => {}

@@ -247,6 +247,48 @@ pub(super) async fn frame_exr(request: FrameRequest) -> Result<Response> {
     Ok(response)
 }
 
+/// The query of `difference`.
+#[derive(Deserialize)]
+pub(super) struct DifferenceQuery {
+    with: String,
+}
+
+/// `GET /v1/renders/{id}/difference?with=…`: whether two renders are of the same picture.
+pub(super) async fn difference(
+    State(app): State<App>,
+    Id(id): Id,
+    query: std::result::Result<Query<DifferenceQuery>, axum::extract::rejection::QueryRejection>,
+    headers: HeaderMap,
+) -> Result<Response> {
+    let answer = negotiate(&headers, &["image/png", "application/json"])?;
+    let Ok(Query(DifferenceQuery { with })) = query else {
+        return Err(Error::invalid("query:with", "missing", "the id of another render"));
+    };
+    let film = |id: &str| -> Result<_> {
+        let job = find(&app, id)?;
+        let film =
+            job.film().ok_or_else(|| Error::NotFound { what: "film (any more) of render", id: job.id().into() })?;
+        Ok(film.0)
+    };
+    let (ours, theirs) = (film(&id)?, film(&with)?);
+    let compared = tokio::task::spawn_blocking(move || -> Result<_> {
+        let difference = ours.compare(&theirs)?;
+        let png = difference.png()?;
+        Ok((difference, png))
+    });
+    let (difference, png) = compared.await.map_err(Error::internal)??;
+    if answer == "application/json" {
+        return Ok(Json(difference).into_response());
+    }
+    let told = [
+        (header::CONTENT_TYPE.as_str(), "image/png".to_owned()),
+        ("X-Cloudchamber-P-Value", format!("{:.6e}", difference.p_value)),
+        ("X-Cloudchamber-Pixels-Beyond", difference.beyond.to_string()),
+        ("X-Cloudchamber-Agree", difference.agree.to_string()),
+    ];
+    Ok((told, png).into_response())
+}
+
 /// `GET /v1/renders/{id}/field`.
 pub(super) async fn field(State(app): State<App>, Id(id): Id) -> Result<Response> {
     let job = find(&app, &id)?;

@@ -25,6 +25,7 @@ pub(super) fn router(app: App, tokens: Tokens, origins: &[String]) -> Result<Rou
         .route("/v1/renders/{id}/frames", get(streams::frames))
         .route("/v1/renders/{id}/frame.png", get(renders::frame_png))
         .route("/v1/renders/{id}/frame.exr", get(renders::frame_exr))
+        .route("/v1/renders/{id}/difference", get(renders::difference))
         .route("/v1/renders/{id}/field", get(renders::field))
         .route("/v1/renders/{id}/events", get(streams::events))
         .route("/v1/renders/{id}/convergence.svg", get(renders::convergence))

@@ -12,6 +12,7 @@ mod live;
 mod pace;
 mod report;
 mod resource;
+mod tiling;
 mod view_run;
 
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -60,6 +61,7 @@ impl SampleCounts {
     /// What a job says of them.
     fn report(&self, film: &Film, counts: &mut Counts) {
         counts.non_finite_samples = self.non_finite.into();
+        counts.non_finite_pixels = film.main.unknown_pixels() as u64;
         counts.fireflies = self.fireflies.into();
         counts.clamped_samples = self.clamped.into();
         let kept = film.luminance_sum();

@@ -60,9 +60,11 @@ pub struct Timings {
 pub struct Counts {
     /// Samples that were not finite; each was taken as black.
     pub non_finite_samples: u64,
+    /// Pixels of which a sample was not finite: their error is not known (`standard_error` of the EXR is no number there).
+    pub non_finite_pixels: u64,
     /// Voxels of the volume that are not finite; they are rendered as empty.
     pub non_finite_voxels: u64,
-    /// Samples further than ten standard deviations above what their pixel had before, from its 16th sample on.
+    /// Samples that brought more than twice the light of all that their pixel had before, from its 17th sample on.
     pub fireflies: u64,
     /// Samples that were scaled down to `clamp_luminance`,
     pub clamped_samples: u64,

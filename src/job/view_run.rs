@@ -12,6 +12,7 @@ use glam::Vec2;
 use super::SampleCounts;
 use super::context::{DeviceContext, DeviceVolume, warm};
 use super::pace::Pace;
+use super::tiling::Tiling;
 use crate::device::Buffer;
 use crate::device::structs::View as DeviceView;
 use crate::error::Result;
@@ -38,6 +39,37 @@ struct Layer {
     table: Buffer,
     /// Tells its random numbers from the others'.
     stream: u32,
+    /// Of a view that renders tiles: what its passes sample.
+    tiling: Option<(Tiling, Buffer)>,
+}
+
+impl Layer {
+    /// Work-items of a pass, and about how many rays each has.
+    fn items(&self, lanes: usize) -> (usize, usize) {
+        if let Some((tiling, _)) = &self.tiling {
+            let (entries, samples) = tiling.size_of_pass();
+            return (entries, (samples * tiling.side().pow(2) / entries.max(1)).max(1));
+        }
+        let [beam_w, beam_h] = beam_pixels(lanes);
+        (self.width.div_ceil(beam_w) * self.height.div_ceil(beam_h), beam_w * beam_h)
+    }
+
+    fn read(&self, context: &DeviceContext) -> Result<Samples> {
+        let pixels = self.width * self.height;
+        let (mut mean, mut m2) = (vec![0.0f32; 4 * pixels], vec![0.0f32; pixels]);
+        context.device.read(&self.buffer, 0, &mut mean)?;
+        context.device.read(&self.buffer, 16 * pixels, &mut m2)?;
+        let tiles = self.tiling.as_ref().and_then(|(tiling, _)| tiling.counts());
+        Ok(Samples {
+            width: self.width,
+            height: self.height,
+            stride: self.stride,
+            count: self.samples,
+            mean,
+            m2,
+            tiles,
+        })
+    }
 }
 
 /// Which layer a pass goes to.
@@ -70,7 +102,7 @@ pub(super) struct ViewRun {
     /// The longest way through the volume, world units.
     longest: f64,
     least_step: f32,
-    tile: Option<usize>,
+    adaptive: bool,
     /// Device time since the start.
     pub device_time: Duration,
 }
@@ -87,8 +119,16 @@ impl ViewRun {
         let distances = distances(context, &on_device, volume, &mut plan)?;
         let size = scene.image().map(|n| n as usize);
         let device = &context.device;
+        let tile = scene.view().tile().map(|side| if device.info().lanes > 1 { side } else { 1 });
         let layer = |stride: usize, stream: u32, step: f32| -> Result<Layer> {
             let (width, height) = (size[0].div_ceil(stride), size[1].div_ceil(stride));
+            let tiling = tile
+                .map(|side| -> Result<_> {
+                    let tiling = Tiling::new(side, width, height);
+                    let [wide, high] = tiling.size();
+                    Ok((tiling, device.allocate(4 * (1 + 3 * wide * high))?))
+                })
+                .transpose()?;
             let table = device.upload(bytemuck::cast_slice(&scene.view().table(volume, step)?), 8)?;
             Ok(Layer {
                 buffer: device.allocate(20 * width * height)?,
@@ -98,6 +138,7 @@ impl ViewRun {
                 samples: 0,
                 table,
                 stream,
+                tiling,
             })
         };
         let sparse = match size[0].min(size[1]) {
@@ -120,7 +161,7 @@ impl ViewRun {
             pass_time: Duration::ZERO,
             longest,
             least_step: (LEAST_STEP_VOXELS * smallest) as f32,
-            tile: scene.view().tile(),
+            adaptive: scene.view().adaptive(),
             plan,
             volume: on_device,
             distances,
@@ -157,6 +198,9 @@ impl ViewRun {
         self.quick = quick(speed, self.size);
         for layer in &mut self.layers {
             layer.samples = 0;
+            if let Some((tiling, _)) = &mut layer.tiling {
+                tiling.restart();
+            }
         }
         (self.pass, self.cursor, self.device_time) = (None, 0, Duration::ZERO);
         Ok(())
@@ -217,21 +261,15 @@ impl ViewRun {
     pub fn slice(&mut self, context: &mut DeviceContext, slice: Duration) -> Result<Option<Pass>> {
         let pass = match self.pass {
             Some(pass) => pass,
-            None => self.begin(),
+            None => self.begin(context)?,
         };
         let layer = &self.layers[index(pass)];
-        let lanes = context.device.info().lanes as usize;
-        let [beam_w, beam_h] = match self.tile {
-            Some(side) if lanes > 1 => [side; 2],
-            _ => beam_pixels(lanes),
-        };
-        let beams = layer.width.div_ceil(beam_w) * layer.height.div_ceil(beam_h);
-        let rays = beam_w * beam_h;
+        let (beams, rays) = layer.items(context.device.info().lanes as usize);
         let items = self.pace.items(context.device.info(), slice, rays).min(beams - self.cursor);
         self.pass_view.first_beam = self.cursor as i32;
         context.device.write(&mut self.view_buffer, 0, bytemuck::bytes_of(&self.pass_view))?;
         let layer = &self.layers[index(pass)];
-        let arguments = [
+        let mut arguments = vec![
             &self.view_buffer,
             &self.parameters,
             &self.volume.voxels,
@@ -240,6 +278,7 @@ impl ViewRun {
             &layer.buffer,
             &self.counts,
         ];
+        arguments.extend(layer.tiling.as_ref().map(|(_, buffer)| buffer));
         let took = context.device.run(&self.plan.variant, &arguments, items)?;
         self.pace.learn(items, rays, took);
         self.device_time += took;
@@ -251,14 +290,23 @@ impl ViewRun {
         if pass == Pass::Main {
             context.measured(&self.plan.variant, self.size[0] * self.size[1], self.pass_time);
         }
-        self.layers[index(pass)].samples += 1;
+        let layer = &mut self.layers[index(pass)];
+        layer.samples += 1;
+        if let Some((tiling, _)) = &mut layer.tiling {
+            tiling.passed();
+        }
         (self.pass, self.cursor) = (None, 0);
         Ok(Some(pass))
     }
 
     /// Chooses the next pass.
-    fn begin(&mut self) -> Pass {
+    fn begin(&mut self, context: &DeviceContext) -> Result<Pass> {
         let pass = self.next_pass();
+        self.choose_tiles(context, pass)?;
+        if pass == Pass::Main && self.samples() == 0 {
+            // What is counted is of the picture, not of its preview.
+            context.device.write(&mut self.counts, 0, &[0; 32])?;
+        }
         let layer = &self.layers[index(pass)];
         let offset = pixel_offset(layer.samples);
         let view = DeviceView {
@@ -274,33 +322,35 @@ impl ViewRun {
         self.pass_view = view;
         self.pass = Some(pass);
         self.pass_time = Duration::ZERO;
-        pass
+        Ok(pass)
+    }
+
+    /// Tells the device which tiles the pass samples.
+    fn choose_tiles(&mut self, context: &DeviceContext, pass: Pass) -> Result<()> {
+        let layer = &mut self.layers[index(pass)];
+        let samples = layer.samples;
+        if self.adaptive && pass == Pass::Main && layer.tiling.as_ref().is_some_and(|(t, _)| t.is_due(samples)) {
+            let read = layer.read(context)?;
+            if let Some((tiling, _)) = &mut layer.tiling {
+                tiling.plan(samples, &read.deviations(tiling.side()));
+            }
+        }
+        if let Some((tiling, buffer)) = &mut layer.tiling {
+            context.device.write(buffer, 0, bytemuck::cast_slice(&tiling.pass()))?;
+        }
+        Ok(())
     }
 
     /// Reads what there is to see: the passes proper, or before the first of them the control.
     pub fn film(&self, context: &DeviceContext) -> Result<Film> {
         let [control, main] = &self.layers;
-        let read = |layer: &Layer| -> Result<Samples> {
-            let pixels = layer.width * layer.height;
-            let (mut mean, mut m2) = (vec![0.0f32; 4 * pixels], vec![0.0f32; pixels]);
-            context.device.read(&layer.buffer, 0, &mut mean)?;
-            context.device.read(&layer.buffer, 16 * pixels, &mut m2)?;
-            Ok(Samples {
-                width: layer.width,
-                height: layer.height,
-                stride: layer.stride,
-                count: layer.samples,
-                mean,
-                m2,
-            })
-        };
         let shown = if main.samples > 0 { main } else { control };
         let controlled = shown.stride == 1 && control.samples > 0 && !self.plan.stepless;
-        let control = controlled.then(|| read(control)).transpose()?;
+        let control = controlled.then(|| control.read(context)).transpose()?;
         let opacity_threshold = self.plan.opacity_threshold;
         Ok(Film {
             size: self.size,
-            main: read(shown)?,
+            main: shown.read(context)?,
             control,
             paired: self.paired(),
             stepless: self.plan.stepless,

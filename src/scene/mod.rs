@@ -94,6 +94,10 @@ pub fn schema(limits: &Limits) -> Value {
     for t in technique::views() {
         schema["properties"][t.name] = parameters_schema(t, limits);
     }
+    for name in ["medium", "lights"] {
+        let of = technique::find("volume_path").map(|t| (t.schema)()["properties"][name].clone());
+        schema["properties"][name] = of.unwrap_or_default();
+    }
     schema["properties"]["volume"]["additionalProperties"] = false.into();
     for t in technique::fields() {
         schema["properties"]["volume"]["properties"][t.name] = (t.schema)();
@@ -127,8 +131,8 @@ impl Scene {
                 "a view; put the field under volume",
             ));
         };
-        let empty = Value::Object(Default::default());
-        let view = parse(request.parameters.get(technique.name).unwrap_or(&empty), &format!("/{}", technique.name))?;
+        let view = parse(&own_parameters(technique, &request)?, &format!("/{}", technique.name))
+            .map_err(|e| where_it_was_given(e, technique, &request))?;
         let (subject, framing) = subject(request.volume.as_ref(), store, limits)?;
         let camera = Camera::from_request(request.camera.as_ref(), &framing)?;
         let clip = Clip::from_request(request.clip.as_ref())?;
@@ -220,6 +224,34 @@ fn background(image: &ImageRequest) -> Result<Background> {
         (_, Some(true)) => Ok(Background::Transparent),
         (color, _) => Ok(Background::Colour(color.unwrap_or_default().map(|c| c as f32))),
     }
+}
+
+/// A technique's own parameters, with the parts of the scene that several techniques share put among them.
+fn own_parameters(technique: &Technique, request: &RenderRequest) -> Result<Value> {
+    let mut own = request.parameters.get(technique.name).cloned().unwrap_or_else(|| Value::Object(Default::default()));
+    for (name, shared) in [("medium", &request.medium), ("lights", &request.lights)] {
+        let Some(shared) = shared else { continue };
+        if (technique.schema)()["properties"].get(name).is_none() {
+            let detail = format!("{} scatters no light", technique.name);
+            return Err(Error::invalid(format!("/{name}"), detail, "single_scatter or volume_path, or leave it out"));
+        }
+        if own.get(name).is_some() {
+            let detail = format!("/{}/{name} is given too", technique.name);
+            return Err(Error::invalid(format!("/{name}"), detail, "in one place"));
+        }
+        own[name] = shared.clone();
+    }
+    Ok(own)
+}
+
+/// The error with the pointers that the request has, for what was put among a technique's own parameters.
+fn where_it_was_given(error: Error, technique: &Technique, request: &RenderRequest) -> Error {
+    let shared = [("medium", request.medium.is_some()), ("lights", request.lights.is_some())];
+    error.with_pointers(|pointer| {
+        let rest = pointer.strip_prefix(&format!("/{}", technique.name))?;
+        let name = rest.strip_prefix('/')?.split('/').next()?;
+        shared.contains(&(name, true)).then(|| rest.to_owned())
+    })
 }
 
 /// A budget that names only a time or an error may take as many samples as the server permits.

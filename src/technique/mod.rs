@@ -154,6 +154,10 @@ pub trait View: Send + Sync {
     fn tile(&self) -> Option<usize> {
         None
     }
+    /// Whether samples are put where the noise is; only with tiles.
+    fn adaptive(&self) -> bool {
+        false
+    }
     /// Samples per pixel before which a render does not stop for its error: of fewer the error itself is not known.
     fn least_samples(&self) -> u32 {
         2

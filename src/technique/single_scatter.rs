@@ -16,6 +16,7 @@
 //! | `march_step_voxels` | smallest voxel side | 0.01–16 | 1 |
 //! | `equiangular` | | | true |
 //! | `clamp_luminance` | | | none |
+//! | `adaptive` | | | false |
 //!
 //! Example: see [`example`], which a test runs.
 

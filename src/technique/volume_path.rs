@@ -19,6 +19,7 @@
 //! | `next_event` | | | true |
 //! | `roulette_threshold` | | 0–1 | 0.25 |
 //! | `clamp_luminance` | | | none |
+//! | `adaptive` | | | false |
 //!
 //! Example: see [`example`], which a test runs.
 

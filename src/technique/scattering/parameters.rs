@@ -68,6 +68,10 @@ pub struct Parameters {
     /// Samples of more luminance than this are scaled down to it, and what that takes away is reported. Default: none are.
     #[schemars(range(min = 1e-9, max = 1e9))]
     pub clamp_luminance: Option<f64>,
+    /// Sample those parts of the picture more often that have more noise, from the 16th sample on: less error for the same time, and a
+    /// small bias.
+    #[serde(default)]
+    pub adaptive: bool,
     /// Paths end at the collision after so many scatterings; none are cut off by default.
     #[schemars(range(min = 0, max = 1_000_000))]
     pub max_scatterings: Option<u32>,

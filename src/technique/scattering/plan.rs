@@ -55,13 +55,14 @@ pub(in crate::technique) fn source(kernel: &'static str) -> Source {
             "shared/flight.h",
             "shared/light.h",
             "shared/surface.h",
+            "shared/tile.h",
         ],
         structs: || {
             "#pragma OPENCL EXTENSION cl_khr_int64_base_atomics : enable\n".to_owned()
                 + &DeviceView::opencl_text()
                 + &Scattering::opencl_text()
         },
-        arguments: 7,
+        arguments: 8,
         volume: Some(2),
         variants: match kernel {
             "single_scatter" => || variants("single_scatter"),
@@ -250,6 +251,10 @@ impl View for Scatterer {
 
     fn tile(&self) -> Option<usize> {
         Some(16)
+    }
+
+    fn adaptive(&self) -> bool {
+        self.parameters.adaptive
     }
 
     fn least_samples(&self) -> u32 {

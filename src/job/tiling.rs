@@ -1,0 +1,151 @@
+//! Which tiles of a picture the next pass samples, and how often: all of them once, or, where a render is adaptive, those with the more
+//! error the more often.
+//!
+//! With n_i samples of a tile whose samples have the deviation σ_i, Σ σ_i² / n_i is least for a given Σ n_i where n_i ∝ σ_i (Neyman,
+//! JRSS 97, 1934). The deviations are looked at after 16, 24, 32, 48, 64, … samples on average, and every pass is one sample on average, so
+//! that what is sampled depends on nothing but the samples. To choose by the samples themselves is biased: a tile that happens to look
+//! calm is looked at less often. A part of the mean deviation is added to each, which keeps the bias small.
+
+use crate::film::Tiles;
+
+/// The part of the mean deviation that every tile has at least.
+const FLOOR: f64 = 0.25;
+/// Samples before any deviation is believed.
+pub(super) const BEGIN: u32 = 16;
+
+/// The tiles of one layer.
+pub(super) struct Tiling {
+    side: usize,
+    wide: usize,
+    high: usize,
+    /// Samples of each tile's pixels so far.
+    counts: Vec<u32>,
+    /// Samples that each tile gets in the round under way, and how many passes it has.
+    round: Option<(Vec<u32>, u32)>,
+    passes: u32,
+}
+
+impl Tiling {
+    pub fn new(side: usize, width: usize, height: usize) -> Self {
+        let (wide, high) = (width.div_ceil(side), height.div_ceil(side));
+        Self { side, wide, high, counts: vec![0; wide * high], round: None, passes: 0 }
+    }
+
+    pub fn restart(&mut self) {
+        self.counts.fill(0);
+        (self.round, self.passes) = (None, 0);
+    }
+
+    /// Whether an adaptive render should look at the deviations now.
+    pub fn is_due(&self, samples: u32) -> bool {
+        let done = self.round.as_ref().is_none_or(|(_, passes)| self.passes == *passes);
+        samples >= BEGIN && done
+    }
+
+    /// Plans the samples up to the next look, from the deviation of each tile's samples.
+    pub fn plan(&mut self, samples: u32, deviations: &[f64]) {
+        let passes = if samples.is_power_of_two() { samples / 2 } else { samples / 3 }.max(1);
+        let tiles = self.counts.len() as f64;
+        let mean = deviations.iter().sum::<f64>() / tiles;
+        let weights: Vec<f64> = deviations.iter().map(|d| if mean > 0.0 { d + FLOOR * mean } else { 1.0 }).collect();
+        let scale = f64::from(samples + passes) * tiles / weights.iter().sum::<f64>();
+        let wanted: Vec<f64> =
+            weights.iter().zip(&self.counts).map(|(w, n)| (w * scale - f64::from(*n)).max(0.0)).collect();
+        let scale = f64::from(passes) * tiles / wanted.iter().sum::<f64>().max(1e-30);
+        let mut sum = 0.0f64;
+        let share = |w: &f64| {
+            let before = sum.round();
+            sum += w * scale;
+            (sum.round() - before) as u32
+        };
+        self.round = Some((wanted.iter().map(share).collect(), passes));
+        self.passes = 0;
+    }
+
+    /// What the next pass samples, as `kernels/shared/tile.h` reads it: how many entries, then for each the tile, the number of its next
+    /// sample, and how many it gets.
+    pub fn pass(&self) -> Vec<u32> {
+        let mut list = vec![0];
+        for (tile, &count) in self.counts.iter().enumerate() {
+            let times = self.times(tile);
+            if times > 0 {
+                list.extend([tile as u32, count, times]);
+                list[0] += 1;
+            }
+        }
+        list
+    }
+
+    /// How often the next pass samples a tile: a round's samples are spread evenly over its passes.
+    fn times(&self, tile: usize) -> u32 {
+        let Some((samples, passes)) = &self.round else { return 1 };
+        let upto = |pass: u32| u64::from(samples[tile]) * u64::from(pass) / u64::from(*passes);
+        (upto(self.passes + 1) - upto(self.passes)) as u32
+    }
+
+    /// A pass is over.
+    pub fn passed(&mut self) {
+        let times: Vec<u32> = (0..self.counts.len()).map(|tile| self.times(tile)).collect();
+        for (count, times) in self.counts.iter_mut().zip(times) {
+            *count += times;
+        }
+        self.passes += 1;
+    }
+
+    /// Samples by tile, where they differ.
+    pub fn counts(&self) -> Option<Tiles> {
+        self.round.as_ref().map(|_| Tiles { side: self.side, wide: self.wide, counts: self.counts.clone() })
+    }
+
+    /// Entries and samples of the next pass.
+    pub fn size_of_pass(&self) -> (usize, usize) {
+        let times: Vec<u32> = (0..self.counts.len()).map(|tile| self.times(tile)).collect();
+        (times.iter().filter(|t| **t > 0).count(), times.iter().map(|t| *t as usize).sum())
+    }
+
+    /// Pixels along a tile's side.
+    pub fn side(&self) -> usize {
+        self.side
+    }
+
+    /// The tile rows and columns.
+    pub fn size(&self) -> [usize; 2] {
+        [self.wide, self.high]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_tile_is_sampled_once_a_pass_until_deviations_are_known() {
+        let mut tiling = Tiling::new(16, 40, 16);
+        assert_eq!((tiling.size(), tiling.pass()), ([3, 1], vec![3, 0, 0, 1, 1, 0, 1, 2, 0, 1]));
+        tiling.passed();
+        assert_eq!(tiling.pass(), vec![3, 0, 1, 1, 1, 1, 1, 2, 1, 1]);
+        assert!(!tiling.is_due(1) && tiling.counts().is_none());
+    }
+
+    #[test]
+    fn samples_go_where_the_deviation_is_and_none_is_lost() {
+        let mut tiling = Tiling::new(16, 64, 16);
+        (0..16).for_each(|_| tiling.passed());
+        let mut samples = 16;
+        while samples < 768 {
+            if tiling.is_due(samples) {
+                tiling.plan(samples, &[0.0, 1.0, 2.0, 5.0]);
+            }
+            let list = tiling.pass();
+            assert_eq!(list.len(), 1 + 3 * list[0] as usize);
+            tiling.passed();
+            samples += 1;
+        }
+        let counts = tiling.counts().unwrap_or_default().counts;
+        assert_eq!(counts.iter().sum::<u32>(), 4 * 768, "{counts:?}");
+        // Deviations with a quarter of their mean of 2 added: 0.5, 1.5, 2.5, 5.5 of 10.
+        for (count, part) in counts.iter().zip([0.05, 0.15, 0.25, 0.55]) {
+            assert!((f64::from(*count) / 3072.0 - part).abs() < 0.002, "{counts:?}");
+        }
+    }
+}
