@@ -104,7 +104,7 @@ fn nothing_and_what_is_not_a_number_are_empty() {
             let request = scene(technique, volume, &json!({"eye": [2.0, 1.0, 3.0]}), &own, 16, 16);
             let resource = House::shared().finish(&request).resource();
             let warned =
-                resource["warnings"].as_array().is_some_and(|w| w.iter().any(|w| w["code"] == *code.unwrap_or(&"")));
+                resource["warnings"].as_array().is_some_and(|w| w.iter().any(|w| w["code"] == *code.unwrap_or("")));
             assert_eq!(warned, code.is_some(), "{technique}: {}", resource["warnings"]);
             let film = film(House::shared(), &request);
             assert!(film.main.mean.chunks_exact(4).all(|p| (p[0] - 1.0).abs() < 1e-6), "{technique} {volume}");
