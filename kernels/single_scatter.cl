@@ -225,7 +225,7 @@ static inline void arrive(constant const Scattering *params, global const float 
 }
 
 kernel void single_scatter(constant View *view, constant Scattering *params, VOLUME voxels, global const uchar *ranges, global const uchar *rows,
-                           global float *film, global uint *counts, global const uint *tiles) {
+                           global float *film, global uint *counts, global uint *tiles) {
     Tile tile = tile_at(view, tiles);
     global const float *table = (global const float *)rows;
     Sample s;
@@ -239,6 +239,7 @@ kernel void single_scatter(constant View *view, constant Scattering *params, VOL
     f->ratio = s.met = (Mask)(0);
     Mask alive = (Mask)(0);
     int taken = 0;
+    uint steps = 0u;
     f->sample = tile.sample;
     while (f->sample < tile.sample + tile.times) {
         if (taken < ITEM * ITEM && count_lanes(~alive) >= REFILL) {
@@ -254,6 +255,7 @@ kernel void single_scatter(constant View *view, constant Scattering *params, VOL
         Mask over;
         Int face;
         UInt4Lanes r;
+        steps++;
         Mask real = fly(view, params, voxels, ranges, counts, alive, f, &r, &over, &face);
         if (any_lane(real)) collide(params, table, real, &s);
         if (any_lane(over)) arrive(params, table, over, &s);
@@ -266,4 +268,5 @@ kernel void single_scatter(constant View *view, constant Scattering *params, VOL
             alive &= ~done;
         }
     }
+    if (tile.times > 0u) tiles[tile.cost_at] += steps;
 }

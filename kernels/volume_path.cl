@@ -165,7 +165,7 @@ static inline Mask arrive(constant const View *view, constant const Scattering *
 }
 
 kernel void volume_path(constant View *view, constant Scattering *params, VOLUME voxels, global const uchar *ranges, global const uchar *rows,
-                        global float *film, global uint *counts, global const uint *tiles) {
+                        global float *film, global uint *counts, global uint *tiles) {
     Tile tile = tile_at(view, tiles);
     global const float *table = (global const float *)rows;
     Path path;
@@ -179,6 +179,7 @@ kernel void volume_path(constant View *view, constant Scattering *params, VOLUME
     f->ratio = (Mask)(0);
     Mask alive = (Mask)(0);
     int taken = 0;
+    uint steps = 0u;
     f->sample = tile.sample;
     while (f->sample < tile.sample + tile.times) {
         Mask done = (Mask)(0);
@@ -195,6 +196,7 @@ kernel void volume_path(constant View *view, constant Scattering *params, VOLUME
         Mask over, elsewhere = (Mask)(0);
         Int face;
         UInt4Lanes r;
+        steps++;
         Mask real = fly(view, params, voxels, ranges, counts, alive & ~done, f, &r, &over, &face);
         if (any_lane(real)) done |= scatter(view, params, table, r, real, &path, &elsewhere);
         if (any_lane(over)) done |= arrive(view, params, table, over, face, &path, &elsewhere);
@@ -209,4 +211,5 @@ kernel void volume_path(constant View *view, constant Scattering *params, VOLUME
             alive &= ~done;
         }
     }
+    if (tile.times > 0u) tiles[tile.cost_at] += steps;
 }

@@ -15,6 +15,8 @@ mod info;
 mod openapi;
 #[path = "api/renders.rs"]
 mod renders;
+#[path = "api/scattering.rs"]
+mod scattering;
 #[path = "api/support.rs"]
 mod support;
 #[path = "api/uploads.rs"]

@@ -18,6 +18,7 @@ use cloudchamber::technique::emission_absorption::EmissionAbsorption;
 use cloudchamber::technique::isosurface::Isosurface;
 use cloudchamber::technique::photon_transport::{FieldPass, PhotonTransport};
 use cloudchamber::technique::projection::Projection;
+use cloudchamber::technique::scattering::Scattering;
 use cloudchamber::technique::slice::Slice;
 use cloudchamber::technique::{self};
 
@@ -70,6 +71,7 @@ fn structs_lie_the_same_on_host_and_device() {
     same_on_both_sides::<Isosurface>();
     same_on_both_sides::<PhotonTransport>();
     same_on_both_sides::<Projection>();
+    same_on_both_sides::<Scattering>();
     same_on_both_sides::<Slice>();
 }
 
@@ -153,6 +155,17 @@ const GAMMAS: &str = r#"{"technique": "emission_absorption", "volume": {"photon_
     "medium": {"phase": {"type": "klein_nishina"}, "attenuation": {"material": "water"}}, "source": {"type": "disk"}}},
     "image": {"width": 5, "height": 4}, "budget": {"samples": 1}}"#;
 
+/// Each kind of light, emission and colours; a surface that refracts; a homogeneous box by two lights in turn.
+const PATHS: &str = r#"{"technique": "volume_path", "volume": {"builtin": "sphere", "resolution": 10}, "image": {"width": 9, "height": 7},
+    "budget": {"samples": 2}, "medium": {"sigma_t_per_unit": [2, 3, 4], "emission": 0.1, "phase": {"type": "tabulated", "cosines": [-1, 0, 1], "densities": [1, 0, 2]}},
+    "lights": [{"type": "sun"}, {"type": "sky"}, {"type": "point", "position": [0, 0, 0]}, {"type": "sphere", "position": [1, 1, 0], "radius": 0.5},
+    {"type": "quad", "corner": [0, 1, 0], "edge_u": [1, 0, 0], "edge_v": [0, 0, 1]}], "volume_path": {"adaptive": true}}"#;
+const GLASS: &str = r#"{"technique": "volume_path", "volume": {"builtin": "constant", "resolution": 8}, "image": {"width": 9, "height": 7},
+    "budget": {"samples": 2}, "medium": {"sigma_t_per_unit": 2, "index": 1.5}, "lights": [{"type": "sky"}]}"#;
+const SINGLE: &str = r#"{"technique": "single_scatter", "volume": {"builtin": "sphere", "resolution": 10}, "image": {"width": 17, "height": 7},
+    "budget": {"samples": 2}, "medium": {"sigma_t_per_unit": 2}, "lights": [{"type": "sun"}, {"type": "point", "position": [0, 0.5, 0]}, {"type": "sky"}],
+    "single_scatter": {"tracking": "exact"}}"#;
+
 const PROJECTION: &str = r#"{"technique": "projection", "volume": {"builtin": "sphere", "resolution": 12},
     "image": {"width": 9, "height": 7}, "budget": {"samples": 2}, "projection": {}}"#;
 const WALK: &str = r#"{"technique": "projection", "volume": {"builtin": "sphere", "resolution": 8},
@@ -167,7 +180,9 @@ const LAYERS: &str = r#"{"technique": "isosurface", "volume": {"builtin": "gauss
 #[test]
 fn a_tiny_case_of_each_kernel_is_clean_under_oclgrind() {
     for lanes in ["1", "4"] {
-        for scene in [VIEW, FIELD, REFRACTION, DELTA, GAMMAS, PROJECTION, WALK, SLICE, ISOSURFACE, LAYERS] {
+        for scene in
+            [VIEW, FIELD, REFRACTION, DELTA, GAMMAS, PATHS, GLASS, SINGLE, PROJECTION, WALK, SLICE, ISOSURFACE, LAYERS]
+        {
             assert_eq!(oclgrind(scene, lanes, None).trim(), "", "{lanes} lanes: {scene}");
         }
     }

@@ -8,6 +8,8 @@ mod common;
 mod agreement;
 #[path = "volume_path/extremes.rs"]
 mod extremes;
+#[path = "volume_path/gather.rs"]
+mod gather;
 #[path = "volume_path/stopping.rs"]
 mod stopping;
 #[path = "volume_path/truth.rs"]

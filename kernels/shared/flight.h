@@ -185,9 +185,11 @@ static inline Mask fly(constant const View *view, constant const Scattering *par
         Mask in_x = crosses & MASK(tx == t_wall), in_y = crosses & ~in_x & MASK(ty == t_wall), in_z = crosses & ~in_x & ~in_y;
         #define CROSS(i, c)                                                                                                \
             f->p.c = select(f->p.c, w##c, in_##c);                                                                         \
-            f->cell.c += select((Int)(0), select((Int)(-1), (Int)(1), MASK(f->way.c > 0.0f)), in_##c);                     \
             {                                                                                                              \
-                Mask out = in_##c & (MASK(f->cell.c < 0) | MASK(f->cell.c >= params->walls[i]));                           \
+                Int next = f->cell.c + select((Int)(-1), (Int)(1), MASK(f->way.c > 0.0f));                                 \
+                /* A flight that leaves stays in its cell: there are none beyond to look at. */                            \
+                Mask out = in_##c & (MASK(next < 0) | MASK(next >= params->walls[i]));                                     \
+                f->cell.c = select(f->cell.c, next, in_##c & ~out);                                                        \
                 *over |= out;                                                                                              \
                 *face = select(*face, (Int)(i), out);                                                                      \
             }

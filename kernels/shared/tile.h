@@ -1,5 +1,6 @@
 // A work-item renders a tile of ITEM x ITEM pixels, as often as the pass's list says: how many entries, then for each the tile's number,
-// the number of its next sample, and how many it gets. A lane whose pixel is through takes the next one of the tile.
+// the number of its next sample, and how many it gets; behind room for an entry of every tile, how much each has cost so far, in steps of
+// its packets. A lane whose pixel is through takes the next one of the tile.
 #if LANES == 1
 #define ITEM 1
 #else
@@ -8,19 +9,20 @@
 // Lanes that are free before more pixels are begun.
 #define REFILL (LANES / 8 + 1)
 
-typedef struct { int left, top; uint sample, times; } Tile;
+typedef struct { int left, top; uint sample, times, cost_at; } Tile;
 
 // The tile of the work-item; no times past the end of the list.
-static inline Tile tile_at(constant const View *view, global const uint *tiles) {
+static inline Tile tile_at(constant const View *view, global uint *tiles) {
     uint number = (uint)view->first_beam + (uint)get_global_id(0);
     Tile t;
     t.left = t.top = 0;
-    t.sample = t.times = 0u;
+    t.sample = t.times = t.cost_at = 0u;
     if (number >= tiles[0]) return t;
-    global const uint *entry = tiles + 1 + 3 * number;
-    int wide = (view->width + ITEM - 1) / ITEM;
+    global uint *entry = tiles + 1 + 3 * number;
+    int wide = (view->width + ITEM - 1) / ITEM, high = (view->height + ITEM - 1) / ITEM;
     t.left = (int)entry[0] % wide * ITEM, t.top = (int)entry[0] / wide * ITEM;
     t.sample = entry[1], t.times = entry[2];
+    t.cost_at = 1u + 3u * (uint)(wide * high) + entry[0];
     return t;
 }
 

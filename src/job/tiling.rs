@@ -1,8 +1,8 @@
 //! Which tiles of a picture the next pass samples, and how often: all of them once, or, where a render is adaptive, those with the more
 //! error the more often.
 //!
-//! With n_i samples of a tile whose samples have the deviation σ_i, Σ σ_i² / n_i is least for a given Σ n_i where n_i ∝ σ_i (Neyman,
-//! JRSS 97, 1934). The deviations are looked at after 16, 24, 32, 48, 64, … samples on average, and every pass is one sample on average, so
+//! With n_i samples of a tile whose samples have the deviation σ_i and cost c_i each, Σ σ_i² / n_i is least for a given Σ n_i c_i where
+//! n_i ∝ σ_i / √c_i (Neyman, JRSS 97, 1934). The cost is counted in steps of the kernel, not in time, which depends on the weather. The deviations are looked at after 16, 24, 32, 48, 64, … samples on average, and every pass is one sample on average, so
 //! that what is sampled depends on nothing but the samples. To choose by the samples themselves is biased: a tile that happens to look
 //! calm is looked at less often. A part of the mean deviation is added to each, which keeps the bias small.
 
@@ -42,12 +42,14 @@ impl Tiling {
         samples >= BEGIN && done
     }
 
-    /// Plans the samples up to the next look, from the deviation of each tile's samples.
-    pub fn plan(&mut self, samples: u32, deviations: &[f64]) {
+    /// Plans the samples up to the next look, from the deviation of each tile's samples and what they have cost so far.
+    pub fn plan(&mut self, samples: u32, deviations: &[f64], costs: &[u32]) {
         let passes = if samples.is_power_of_two() { samples / 2 } else { samples / 3 }.max(1);
         let tiles = self.counts.len() as f64;
         let mean = deviations.iter().sum::<f64>() / tiles;
-        let weights: Vec<f64> = deviations.iter().map(|d| if mean > 0.0 { d + FLOOR * mean } else { 1.0 }).collect();
+        let each = costs.iter().zip(&self.counts).map(|(c, n)| f64::from((*c).max(1)) / f64::from((*n).max(1)));
+        let weight = |(d, c): (&f64, f64)| if mean > 0.0 { (d + FLOOR * mean) / c.sqrt() } else { 1.0 };
+        let weights: Vec<f64> = deviations.iter().zip(each).map(weight).collect();
         let scale = f64::from(samples + passes) * tiles / weights.iter().sum::<f64>();
         let wanted: Vec<f64> =
             weights.iter().zip(&self.counts).map(|(w, n)| (w * scale - f64::from(*n)).max(0.0)).collect();
@@ -134,7 +136,9 @@ mod tests {
         let mut samples = 16;
         while samples < 768 {
             if tiling.is_due(samples) {
-                tiling.plan(samples, &[0.0, 1.0, 2.0, 5.0]);
+                // Costs of 1, 1, 1 and 4 a sample.
+                let costs: Vec<u32> = tiling.counts.iter().zip([1, 1, 1, 4]).map(|(n, c)| n * c).collect();
+                tiling.plan(samples, &[0.0, 1.0, 2.0, 10.0], &costs);
             }
             let list = tiling.pass();
             assert_eq!(list.len(), 1 + 3 * list[0] as usize);
@@ -143,8 +147,8 @@ mod tests {
         }
         let counts = tiling.counts().unwrap_or_default().counts;
         assert_eq!(counts.iter().sum::<u32>(), 4 * 768, "{counts:?}");
-        // Deviations with a quarter of their mean of 2 added: 0.5, 1.5, 2.5, 5.5 of 10.
-        for (count, part) in counts.iter().zip([0.05, 0.15, 0.25, 0.55]) {
+        // Deviations with a quarter of their mean added, over the roots of the costs: 0.8125, 1.8125, 2.8125, 5.40625 of 10.84375.
+        for (count, part) in counts.iter().zip([0.0749, 0.1672, 0.2594, 0.4985]) {
             assert!((f64::from(*count) / 3072.0 - part).abs() < 0.002, "{counts:?}");
         }
     }

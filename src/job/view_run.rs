@@ -126,7 +126,7 @@ impl ViewRun {
                 .map(|side| -> Result<_> {
                     let tiling = Tiling::new(side, width, height);
                     let [wide, high] = tiling.size();
-                    Ok((tiling, device.allocate(4 * (1 + 3 * wide * high))?))
+                    Ok((tiling, device.upload(&vec![0; 4 * (1 + 4 * wide * high)], 0)?))
                 })
                 .transpose()?;
             let table = device.upload(bytemuck::cast_slice(&scene.view().table(volume, step)?), 8)?;
@@ -198,8 +198,9 @@ impl ViewRun {
         self.quick = quick(speed, self.size);
         for layer in &mut self.layers {
             layer.samples = 0;
-            if let Some((tiling, _)) = &mut layer.tiling {
+            if let Some((tiling, buffer)) = &mut layer.tiling {
                 tiling.restart();
+                context.device.write(buffer, 0, &vec![0; buffer.len()])?;
             }
         }
         (self.pass, self.cursor, self.device_time) = (None, 0, Duration::ZERO);
@@ -331,8 +332,11 @@ impl ViewRun {
         let samples = layer.samples;
         if self.adaptive && pass == Pass::Main && layer.tiling.as_ref().is_some_and(|(t, _)| t.is_due(samples)) {
             let read = layer.read(context)?;
-            if let Some((tiling, _)) = &mut layer.tiling {
-                tiling.plan(samples, &read.deviations(tiling.side()));
+            if let Some((tiling, buffer)) = &mut layer.tiling {
+                let [wide, high] = tiling.size();
+                let mut costs = vec![0u32; wide * high];
+                context.device.read(buffer, 4 * (1 + 3 * wide * high), &mut costs)?;
+                tiling.plan(samples, &read.deviations(tiling.side()), &costs);
             }
         }
         if let Some((tiling, buffer)) = &mut layer.tiling {
