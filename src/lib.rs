@@ -16,7 +16,7 @@
 //! | [`http`] | routes, content negotiation, problem details, streams, OpenAPI; no physics |
 //! | [`client`] | the command line's side of the HTTP contract |
 //! | [`request`] | wire types and the schemas they are checked against |
-//! | [`scene`] | the validated scene: camera, transfer function, budget |
+//! | [`scene`] | the validated scene: camera, transfer function, medium, lights, budget |
 //! | [`technique`] | the list of techniques; one file each, which makes plans as data |
 //! | [`volume`] | grids: readers, built-ins, the store |
 //! | [`job`] | queue, fair slices on the device thread, cancellation, the latest frame |

@@ -8,6 +8,7 @@ mod context;
 mod develop;
 mod engine;
 mod field_run;
+mod layer;
 mod live;
 mod pace;
 mod report;

@@ -17,7 +17,6 @@ pub(super) const BEGIN: u32 = 16;
 pub(super) struct Tiling {
     side: usize,
     wide: usize,
-    high: usize,
     /// Samples of each tile's pixels so far.
     counts: Vec<u32>,
     /// Samples that each tile gets in the round under way, and how many passes it has.
@@ -28,7 +27,7 @@ pub(super) struct Tiling {
 impl Tiling {
     pub fn new(side: usize, width: usize, height: usize) -> Self {
         let (wide, high) = (width.div_ceil(side), height.div_ceil(side));
-        Self { side, wide, high, counts: vec![0; wide * high], round: None, passes: 0 }
+        Self { side, wide, counts: vec![0; wide * high], round: None, passes: 0 }
     }
 
     pub fn restart(&mut self) {
@@ -110,9 +109,19 @@ impl Tiling {
         self.side
     }
 
-    /// The tile rows and columns.
-    pub fn size(&self) -> [usize; 2] {
-        [self.wide, self.high]
+    /// How many tiles there are.
+    pub fn tiles(&self) -> usize {
+        self.counts.len()
+    }
+
+    /// Bytes of what the device is told and tells: an entry of every tile, and behind them what each has cost.
+    pub fn room(&self) -> usize {
+        self.costs_at() + 4 * self.tiles()
+    }
+
+    /// Where the costs start, in bytes.
+    pub fn costs_at(&self) -> usize {
+        4 * (1 + 3 * self.tiles())
     }
 }
 
@@ -123,7 +132,7 @@ mod tests {
     #[test]
     fn every_tile_is_sampled_once_a_pass_until_deviations_are_known() {
         let mut tiling = Tiling::new(16, 40, 16);
-        assert_eq!((tiling.size(), tiling.pass()), ([3, 1], vec![3, 0, 0, 1, 1, 0, 1, 2, 0, 1]));
+        assert_eq!((tiling.tiles(), tiling.pass()), (3, vec![3, 0, 0, 1, 1, 0, 1, 2, 0, 1]));
         tiling.passed();
         assert_eq!(tiling.pass(), vec![3, 0, 1, 1, 1, 1, 1, 2, 1, 1]);
         assert!(!tiling.is_due(1) && tiling.counts().is_none());

@@ -7,16 +7,14 @@
 use std::rc::Rc;
 use std::time::Duration;
 
-use glam::Vec2;
-
 use super::SampleCounts;
 use super::context::{DeviceContext, DeviceVolume, warm};
+use super::layer::{Layer, pixel_offset};
 use super::pace::Pace;
-use super::tiling::Tiling;
 use crate::device::Buffer;
 use crate::device::structs::View as DeviceView;
 use crate::error::Result;
-use crate::film::{Film, Samples};
+use crate::film::Film;
 use crate::scene::{self, Scene};
 use crate::technique::{CellUse, ViewPlan};
 use crate::volume::Volume;
@@ -27,50 +25,6 @@ const LEAST_STEP_VOXELS: f64 = 0.05;
 const QUICK_MS: f64 = 50.0;
 /// Stride of the control by the picture's shorter side: from 400 on, from 200 on, below. A thousand pixels and more tell the error.
 const CONTROL: [usize; 3] = [8, 4, 2];
-
-/// One set of samples on the device.
-struct Layer {
-    buffer: Buffer,
-    width: usize,
-    height: usize,
-    stride: usize,
-    samples: u32,
-    /// The kernel's table for its step.
-    table: Buffer,
-    /// Tells its random numbers from the others'.
-    stream: u32,
-    /// Of a view that renders tiles: what its passes sample.
-    tiling: Option<(Tiling, Buffer)>,
-}
-
-impl Layer {
-    /// Work-items of a pass, and about how many rays each has.
-    fn items(&self, lanes: usize) -> (usize, usize) {
-        if let Some((tiling, _)) = &self.tiling {
-            let (entries, samples) = tiling.size_of_pass();
-            return (entries, (samples * tiling.side().pow(2) / entries.max(1)).max(1));
-        }
-        let [beam_w, beam_h] = beam_pixels(lanes);
-        (self.width.div_ceil(beam_w) * self.height.div_ceil(beam_h), beam_w * beam_h)
-    }
-
-    fn read(&self, context: &DeviceContext) -> Result<Samples> {
-        let pixels = self.width * self.height;
-        let (mut mean, mut m2) = (vec![0.0f32; 4 * pixels], vec![0.0f32; pixels]);
-        context.device.read(&self.buffer, 0, &mut mean)?;
-        context.device.read(&self.buffer, 16 * pixels, &mut m2)?;
-        let tiles = self.tiling.as_ref().and_then(|(tiling, _)| tiling.counts());
-        Ok(Samples {
-            width: self.width,
-            height: self.height,
-            stride: self.stride,
-            count: self.samples,
-            mean,
-            m2,
-            tiles,
-        })
-    }
-}
 
 /// Which layer a pass goes to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -119,34 +73,15 @@ impl ViewRun {
         let distances = distances(context, &on_device, volume, &mut plan)?;
         let size = scene.image().map(|n| n as usize);
         let device = &context.device;
-        let tile = scene.view().tile().map(|side| if device.info().lanes > 1 { side } else { 1 });
-        let layer = |stride: usize, stream: u32, step: f32| -> Result<Layer> {
-            let (width, height) = (size[0].div_ceil(stride), size[1].div_ceil(stride));
-            let tiling = tile
-                .map(|side| -> Result<_> {
-                    let tiling = Tiling::new(side, width, height);
-                    let [wide, high] = tiling.size();
-                    Ok((tiling, device.upload(&vec![0; 4 * (1 + 4 * wide * high)], 0)?))
-                })
-                .transpose()?;
-            let table = device.upload(bytemuck::cast_slice(&scene.view().table(volume, step)?), 8)?;
-            Ok(Layer {
-                buffer: device.allocate(20 * width * height)?,
-                width,
-                height,
-                stride,
-                samples: 0,
-                table,
-                stream,
-                tiling,
-            })
-        };
         let sparse = match size[0].min(size[1]) {
             400.. => CONTROL[0],
             200.. => CONTROL[1],
             _ => CONTROL[2],
         };
-        let layers = [layer(sparse, 1, 2.0 * plan.step)?, layer(1, 0, plan.step)?];
+        let layers = [
+            Layer::new(device, scene, volume, sparse, 1, 2.0 * plan.step)?,
+            Layer::new(device, scene, volume, 1, 0, plan.step)?,
+        ];
         let parameters = device.upload(&scene.view().parameters(volume, scene.camera())?, 0)?;
         let view = Self::view(scene, volume);
         let view_buffer = device.allocate(size_of::<DeviceView>())?;
@@ -197,11 +132,7 @@ impl ViewRun {
         self.pace = Pace::new(context.device.info(), self.longest / f64::from(self.plan.step), speed);
         self.quick = quick(speed, self.size);
         for layer in &mut self.layers {
-            layer.samples = 0;
-            if let Some((tiling, buffer)) = &mut layer.tiling {
-                tiling.restart();
-                context.device.write(buffer, 0, &vec![0; buffer.len()])?;
-            }
+            layer.restart(&context.device)?;
         }
         (self.pass, self.cursor, self.device_time) = (None, 0, Duration::ZERO);
         Ok(())
@@ -279,7 +210,7 @@ impl ViewRun {
             &layer.buffer,
             &self.counts,
         ];
-        arguments.extend(layer.tiling.as_ref().map(|(_, buffer)| buffer));
+        arguments.extend(layer.tiles());
         let took = context.device.run(&self.plan.variant, &arguments, items)?;
         self.pace.learn(items, rays, took);
         self.device_time += took;
@@ -291,11 +222,7 @@ impl ViewRun {
         if pass == Pass::Main {
             context.measured(&self.plan.variant, self.size[0] * self.size[1], self.pass_time);
         }
-        let layer = &mut self.layers[index(pass)];
-        layer.samples += 1;
-        if let Some((tiling, _)) = &mut layer.tiling {
-            tiling.passed();
-        }
+        self.layers[index(pass)].passed();
         (self.pass, self.cursor) = (None, 0);
         Ok(Some(pass))
     }
@@ -303,7 +230,8 @@ impl ViewRun {
     /// Chooses the next pass.
     fn begin(&mut self, context: &DeviceContext) -> Result<Pass> {
         let pass = self.next_pass();
-        self.choose_tiles(context, pass)?;
+        let adaptive = self.adaptive && pass == Pass::Main;
+        self.layers[index(pass)].choose_tiles(context, adaptive)?;
         if pass == Pass::Main && self.samples() == 0 {
             // What is counted is of the picture, not of its preview.
             context.device.write(&mut self.counts, 0, &[0; 32])?;
@@ -324,25 +252,6 @@ impl ViewRun {
         self.pass = Some(pass);
         self.pass_time = Duration::ZERO;
         Ok(pass)
-    }
-
-    /// Tells the device which tiles the pass samples.
-    fn choose_tiles(&mut self, context: &DeviceContext, pass: Pass) -> Result<()> {
-        let layer = &mut self.layers[index(pass)];
-        let samples = layer.samples;
-        if self.adaptive && pass == Pass::Main && layer.tiling.as_ref().is_some_and(|(t, _)| t.is_due(samples)) {
-            let read = layer.read(context)?;
-            if let Some((tiling, buffer)) = &mut layer.tiling {
-                let [wide, high] = tiling.size();
-                let mut costs = vec![0u32; wide * high];
-                context.device.read(buffer, 4 * (1 + 3 * wide * high), &mut costs)?;
-                tiling.plan(samples, &read.deviations(tiling.side()), &costs);
-            }
-        }
-        if let Some((tiling, buffer)) = &mut layer.tiling {
-            context.device.write(buffer, 0, bytemuck::cast_slice(&tiling.pass()))?;
-        }
-        Ok(())
     }
 
     /// Reads what there is to see: the passes proper, or before the first of them the control.
@@ -407,22 +316,4 @@ fn distances(
     let empty = bytes.iter().filter(|d| **d > 0).count();
     plan.reasons.push(format!("{empty} of {} macro-cells are empty under it", bytes.len()));
     Ok(Some(distances))
-}
-
-/// Pixels across and down of a work-item: `BEAM_W` × `TILE_W` and `BEAM_H` × `TILE_H` of `kernels/shared/packet.h`.
-fn beam_pixels(lanes: usize) -> [usize; 2] {
-    match lanes {
-        16 => [8, 8],
-        8 => [8, 4],
-        4 => [4, 4],
-        _ => [1, 1],
-    }
-}
-
-/// Where in the pixels sample `n` goes through: the R2 sequence (Roberts, "The Unreasonable Effectiveness of Quasirandom
-/// Sequences", 2018), whose first point is here the pixel's centre.
-fn pixel_offset(n: u32) -> Vec2 {
-    const PLASTIC: f64 = 1.324_717_957_244_746;
-    let at = |power: i32| (0.5 + f64::from(n) / PLASTIC.powi(power)).fract() as f32;
-    Vec2::new(at(1), at(2))
 }

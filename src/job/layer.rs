@@ -1,0 +1,132 @@
+//! One set of samples of a view on the device, and which of its pixels a pass samples.
+
+use glam::Vec2;
+
+use super::context::DeviceContext;
+use super::tiling::Tiling;
+use crate::device::{Buffer, Device};
+use crate::error::Result;
+use crate::film::Samples;
+use crate::scene::Scene;
+use crate::volume::Volume;
+
+/// One set of samples on the device.
+pub(super) struct Layer {
+    pub buffer: Buffer,
+    pub width: usize,
+    pub height: usize,
+    pub stride: usize,
+    pub samples: u32,
+    /// The kernel's table for its step.
+    pub table: Buffer,
+    /// Tells its random numbers from the others'.
+    pub stream: u32,
+    /// Of a view that renders tiles: what its passes sample.
+    tiling: Option<(Tiling, Buffer)>,
+}
+
+impl Layer {
+    /// Room for every `stride`-th pixel of a scene's picture.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Internal`] when the device has none.
+    pub fn new(device: &Device, scene: &Scene, volume: &Volume, stride: usize, stream: u32, step: f32) -> Result<Self> {
+        let [width, height] = scene.image().map(|n| (n as usize).div_ceil(stride));
+        let tile = scene.view().tile().map(|side| if device.info().lanes > 1 { side } else { 1 });
+        let tiled = |side: usize| -> Result<_> {
+            let tiling = Tiling::new(side, width, height);
+            let buffer = device.upload(&vec![0; tiling.room()], 0)?;
+            Ok((tiling, buffer))
+        };
+        let tiling = tile.map(tiled).transpose()?;
+        let table = device.upload(bytemuck::cast_slice(&scene.view().table(volume, step)?), 8)?;
+        let buffer = device.allocate(20 * width * height)?;
+        Ok(Self { buffer, width, height, stride, samples: 0, table, stream, tiling })
+    }
+
+    /// Forgets what was gathered.
+    pub fn restart(&mut self, device: &Device) -> Result<()> {
+        self.samples = 0;
+        if let Some((tiling, buffer)) = &mut self.tiling {
+            tiling.restart();
+            device.write(buffer, 0, &vec![0; buffer.len()])?;
+        }
+        Ok(())
+    }
+
+    /// A pass is over.
+    pub fn passed(&mut self) {
+        self.samples += 1;
+        if let Some((tiling, _)) = &mut self.tiling {
+            tiling.passed();
+        }
+    }
+
+    /// What a kernel is told of the tiles.
+    pub fn tiles(&self) -> Option<&Buffer> {
+        self.tiling.as_ref().map(|(_, buffer)| buffer)
+    }
+
+    /// Tells the device which tiles the next pass samples; an adaptive one those with the more noise the more often.
+    pub fn choose_tiles(&mut self, context: &DeviceContext, adaptive: bool) -> Result<()> {
+        let samples = self.samples;
+        if adaptive && self.tiling.as_ref().is_some_and(|(t, _)| t.is_due(samples)) {
+            let read = self.read(context)?;
+            if let Some((tiling, buffer)) = &mut self.tiling {
+                let mut costs = vec![0u32; tiling.tiles()];
+                context.device.read(buffer, tiling.costs_at(), &mut costs)?;
+                tiling.plan(samples, &read.deviations(tiling.side()), &costs);
+            }
+        }
+        if let Some((tiling, buffer)) = &mut self.tiling {
+            context.device.write(buffer, 0, bytemuck::cast_slice(&tiling.pass()))?;
+        }
+        Ok(())
+    }
+
+    /// Work-items of a pass, and about how many rays each has.
+    pub fn items(&self, lanes: usize) -> (usize, usize) {
+        if let Some((tiling, _)) = &self.tiling {
+            let (entries, samples) = tiling.size_of_pass();
+            return (entries, (samples * tiling.side().pow(2) / entries.max(1)).max(1));
+        }
+        let [beam_w, beam_h] = beam_pixels(lanes);
+        (self.width.div_ceil(beam_w) * self.height.div_ceil(beam_h), beam_w * beam_h)
+    }
+
+    /// What was gathered.
+    pub fn read(&self, context: &DeviceContext) -> Result<Samples> {
+        let pixels = self.width * self.height;
+        let (mut mean, mut m2) = (vec![0.0f32; 4 * pixels], vec![0.0f32; pixels]);
+        context.device.read(&self.buffer, 0, &mut mean)?;
+        context.device.read(&self.buffer, 16 * pixels, &mut m2)?;
+        let tiles = self.tiling.as_ref().and_then(|(tiling, _)| tiling.counts());
+        Ok(Samples {
+            width: self.width,
+            height: self.height,
+            stride: self.stride,
+            count: self.samples,
+            mean,
+            m2,
+            tiles,
+        })
+    }
+}
+
+/// Pixels across and down of a work-item: `BEAM_W` × `TILE_W` and `BEAM_H` × `TILE_H` of `kernels/shared/packet.h`.
+fn beam_pixels(lanes: usize) -> [usize; 2] {
+    match lanes {
+        16 => [8, 8],
+        8 => [8, 4],
+        4 => [4, 4],
+        _ => [1, 1],
+    }
+}
+
+/// Where in the pixels sample `n` goes through: the R2 sequence (Roberts, "The Unreasonable Effectiveness of Quasirandom
+/// Sequences", 2018), whose first point is here the pixel's centre.
+pub(super) fn pixel_offset(n: u32) -> Vec2 {
+    const PLASTIC: f64 = 1.324_717_957_244_746;
+    let at = |power: i32| (0.5 + f64::from(n) / PLASTIC.powi(power)).fract() as f32;
+    Vec2::new(at(1), at(2))
+}
