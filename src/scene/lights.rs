@@ -83,9 +83,9 @@ impl Default for Lights {
         let sun = LightSource { kind: "sun".into(), ..LightSource::default() };
         let sky = LightSource {
             kind: "sky".into(),
-            zenith: Some(Spectrum::Rgb([0.15, 0.25, 0.45])),
-            horizon: Some(Spectrum::Rgb([0.45, 0.5, 0.55])),
-            ground: Some(Spectrum::Rgb([0.2, 0.18, 0.16])),
+            zenith: Some(Spectrum::Rgb([0.05, 0.11, 0.26])),
+            horizon: Some(Spectrum::Rgb([0.26, 0.34, 0.42])),
+            ground: Some(Spectrum::Rgb([0.1, 0.09, 0.08])),
             ..LightSource::default()
         };
         Self(vec![sun, sky])

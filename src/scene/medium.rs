@@ -48,7 +48,7 @@ impl Spectrum {
 #[serde(deny_unknown_fields, default)]
 pub struct MediumRequest {
     /// Extinction per world unit of length at a density of 1; a number, or one each for red, green and blue. Default: an optical depth of
-    /// 10 from side to side at the greatest density.
+    /// 40 from side to side at the greatest density.
     pub sigma_t_per_unit: Option<Spectrum>,
     /// The part of a collision that is scattered, from 0 to 1; a number, or one each for red, green and blue.
     pub albedo: Spectrum,
@@ -77,7 +77,7 @@ impl Default for MediumRequest {
 }
 
 /// The optical depth from side to side that stands for a medium without `sigma_t_per_unit`.
-const DEFAULT_DEPTH: f64 = 10.0;
+const DEFAULT_DEPTH: f64 = 40.0;
 
 impl MediumRequest {
     /// Checks what the schema cannot say.
@@ -95,10 +95,6 @@ impl MediumRequest {
         }
         self.albedo.check(&format!("{at}/albedo"), 0.0, 1.0)?;
         self.emission.check(&format!("{at}/emission"), 0.0, 1e9)?;
-        if self.phase.kind == "klein_nishina" {
-            let permitted = "a phase function of light; gamma photons are for photon_transport";
-            return Err(Error::invalid(format!("{at}/phase/type"), "gamma photons make no picture here", permitted));
-        }
         self.phase.check(&format!("{at}/phase"))?;
         match self.density_window {
             Some([low, high]) if low == high || !(low.abs() <= 1e30 && high.abs() <= 1e30) => {

@@ -4,6 +4,19 @@ mod device;
 mod parameters;
 mod plan;
 
+use serde_json::Value;
+
+use crate::request;
 pub use device::Scattering;
 pub use parameters::{Majorant, Parameters, Tracking};
 pub(super) use plan::{Scatterer, source};
+
+/// The schema of the parameters without those that are not a technique's own, and without phase functions that are not of light.
+pub(super) fn schema(without: &[&str]) -> Value {
+    let mut schema = request::schema_without::<Parameters>(without);
+    let kinds = schema.pointer_mut("/properties/medium/properties/phase/properties/type/enum");
+    if let Some(kinds) = kinds.and_then(Value::as_array_mut) {
+        kinds.retain(|kind| kind != "klein_nishina");
+    }
+    schema
+}

@@ -8,7 +8,7 @@
 //!
 //! | parameter | unit | range | default |
 //! |---|---|---|---|
-//! | `medium` | | `sigma_t_per_unit`, `albedo`, `phase`, `emission`, `density_window` | depth 10, 0.9, isotropic |
+//! | `medium` | | `sigma_t_per_unit`, `albedo`, `phase`, `emission`, `density_window` | depth 40, 0.9, isotropic |
 //! | `lights` | | `sun`, `sky`, `point`, `sphere`, `quad` | a sun in a blue sky |
 //! | `interpolation` | | `trilinear`, `nearest` | `trilinear` |
 //! | `tracking` | | `auto`, `exact` (nearest), `march` (biased), `delta`, `weighted` | `auto` |
@@ -41,7 +41,7 @@ pub const TECHNIQUE: Technique = Technique {
 };
 
 fn schema() -> Value {
-    request::schema_without::<Parameters>(&["max_scatterings", "next_event", "roulette_threshold"])
+    scattering::schema(&["max_scatterings", "next_event", "roulette_threshold"])
 }
 
 /// A request that works as it is.

@@ -9,7 +9,7 @@
 //!
 //! | parameter | unit | range | default |
 //! |---|---|---|---|
-//! | `medium` | | `sigma_t_per_unit`, `albedo`, `phase`, `emission`, `index`, `density_window` | depth 10, 0.9, isotropic |
+//! | `medium` | | `sigma_t_per_unit`, `albedo`, `phase`, `emission`, `index`, `density_window` | depth 40, 0.9, isotropic |
 //! | `lights` | | `sun`, `sky`, `point`, `sphere`, `quad` | a sun in a blue sky |
 //! | `interpolation` | | `trilinear`, `nearest` | `trilinear` |
 //! | `tracking` | | `auto`, `exact` (nearest), `march` (biased), `delta`, `weighted` | `auto` |
@@ -44,7 +44,7 @@ pub const TECHNIQUE: Technique = Technique {
 };
 
 fn schema() -> Value {
-    request::schema_without::<Parameters>(&["equiangular"])
+    scattering::schema(&["equiangular"])
 }
 
 /// A request that works as it is.
