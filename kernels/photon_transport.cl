@@ -122,8 +122,7 @@ static inline Mask collide(constant const FieldPass *pass, constant const Photon
         if (params->tally == TALLY_FLUENCE) amount = photon->weight * params->deposit_scale / sigma;
         if (params->tally == TALLY_GATHER) {
             Real3 to = real3(params->eye_mm[0] - photon->p.x, params->eye_mm[1] - photon->p.y, params->eye_mm[2] - photon->p.z);
-            Real mu = dot3(photon->d, to) * rsqrt(fmax(dot3(to, to), (Real)(1e-20f)));
-            amount = photon->weight * params->deposit_scale / sigma * phase_density(table, &m, clamp(mu, (Real)(-1.0f), (Real)(1.0f)));
+            amount = photon->weight * params->deposit_scale / sigma * phase_density(table, &m, one_minus_cosine(photon->d, scale3(to, rsqrt(fmax(dot3(to, to), (Real)(1e-20f))))));
         }
         deposit(params, grid, voxel, photon->p, amount, real);
     }

@@ -60,11 +60,13 @@ static inline Real by_angle(const Sample *s, const Light *l, Real u, Mask choose
     Real t_light = dot3(to, s->d);
     Real3 off = minus3(to, scale3(s->d, t_light));
     Real far = fmax(sqrt(dot3(off, off)), fmax(1e-6f * s->length, (Real)(1e-20f)));
-    Real a = atan(-t_light / far), b = atan((s->length - t_light) / far);
-    Real chosen = t_light + far * tan(mad(u, b - a, a));
+    // theta_b - theta_a and the tangent of a sum of angles, so that nothing cancels however far away the light is.
+    Real squared = mad(far, far, t_light * t_light);
+    Real angle = fmax(atan2(s->length * far, mad(far, far, -t_light * (s->length - t_light))), (Real)(1e-30f)), part = u * angle;
+    Real sine = sin(part), chosen = sine * squared / mad(far, cos(part), t_light * sine);
     *t = select(*t, clamp(chosen, (Real)(0.0f), s->length), choose);
     Real past = *t - t_light;
-    return far / (fmax(b - a, (Real)(1e-20f)) * mad(far, far, past * past));
+    return far / (angle * mad(far, far, past * past));
 }
 
 static inline Real by_flight(constant const Scattering *params, Real t) { return params->sigma_mean * exp(-params->sigma_mean * t); }
@@ -74,7 +76,7 @@ static inline Real3 lit(constant const Scattering *params, global const float *t
                         UInt4Lanes r, LightRay *ray) {
     Medium m = phase_of(params);
     *ray = light_ray(l, at, unit_open(r.a), unit_open(r.b));
-    Real density = phase_density(table, &m, clamp(dot3(from, ray->d), (Real)(-1.0f), (Real)(1.0f)));
+    Real density = phase_density(table, &m, one_minus_cosine(from, ray->d));
     Real share = select((Real)(1.0f), ray->density / (ray->density + density), MASK(ray->density > 0.0f));
     return scale3(ray->light, density * share);
 }
@@ -115,7 +117,7 @@ static inline Mask to_sky(constant const View *view, constant const Scattering *
     Medium m = phase_of(params);
     Real one_minus, one_plus;
     sample_phase(table, &m, unit_open(r.a), &one_minus, &one_plus);
-    s->density = select(s->density, phase_density(table, &m, 1.0f - one_minus), on);
+    s->density = select(s->density, phase_density(table, &m, one_minus), on);
     f->p = select3(f->p, s->place, on);
     f->d = select3(f->d, turned(s->d, one_minus, one_plus, unit_open(r.b)), on);
     f->carried = select3(f->carried, s->scattered, on);
@@ -196,7 +198,7 @@ static inline void collide(constant const Scattering *params, global const float
     Real3 at = world_of(params, f->p), arrives = scale3(f->carried, f->weight);
     Real3 origin = select3(s->place_world, s->entry_world, first), way = minus3(at, origin);
     if (params->discs) {
-        Real3 light = met(params, table, origin, f->d, select((Real)(0.0f), s->t_from, first), sqrt(dot3(way, way)), s->density, ~first, 1);
+        Real3 light = met(params, table, origin, f->d, select((Real)(0.0f), s->t_from, first), sqrt(dot3(way, way)), s->density, ~first & MASK(s->density > 0.0f), 1);
         add_light(s, times3(light, arrives), real);
     }
     add_light(s, real3(arrives.x * params->emission[0], arrives.y * params->emission[1], arrives.z * params->emission[2]), real);
@@ -217,7 +219,7 @@ static inline void arrive(constant const Scattering *params, global const float 
     if (!any_lane(out)) return;
     if (params->discs) {
         Real3 origin = select3(s->place_world, s->entry_world, first);
-        Real3 light = met(params, table, origin, f->d, select((Real)(0.0f), s->t_from, first), (Real)(1e30f), s->density, ~first, 1);
+        Real3 light = met(params, table, origin, f->d, select((Real)(0.0f), s->t_from, first), (Real)(1e30f), s->density, ~first & MASK(s->density > 0.0f), 1);
         add_light(s, times3(light, arrives), out);
     }
     if (params->sky) add_light(s, times3(sky_of(params, f->d), arrives), params->sky_visible ? out : out & ~first);
@@ -268,5 +270,5 @@ kernel void single_scatter(constant View *view, constant Scattering *params, VOL
             alive &= ~done;
         }
     }
-    if (tile.times > 0u) tiles[tile.cost_at] += steps;
+    if (tile.times > 0u) tiles[tile.cost_at] = add_sat(tiles[tile.cost_at], steps);
 }

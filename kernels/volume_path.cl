@@ -64,7 +64,8 @@ static inline void begin(constant const View *view, constant const Scattering *p
 static inline Mask surface_out(constant const View *view, constant const Scattering *params, Mask out, Int face, Path *path) {
     Flight *f = &path->flight;
     Mask back = cross_face(view, params->index, face, unit_open(draw(view, f, 4).a), out, &f->d);
-    f->event += as_UInt(select((Int)(0), (Int)(1), out));
+    // In clear glass a path that is totally reflected would go on for ever: a face counts as much as a hundred collisions.
+    f->event += as_UInt(select((Int)(0), (Int)(100), out));
     f->carried = select3(f->carried, scale3(f->carried, (Real)(params->index * params->index)), out & ~back);
     return back;
 }
@@ -104,7 +105,7 @@ static inline Mask scatter(constant const View *view, constant const Scattering 
     Real one_minus, one_plus;
     sample_phase(table, &m, unit_open(r.a), &one_minus, &one_plus);
     path->next = select3(path->next, turned(f->d, one_minus, one_plus, unit_open(r.b)), goes_on);
-    path->density = select(path->density, phase_density(table, &m, 1.0f - one_minus), goes_on);
+    path->density = select(path->density, phase_density(table, &m, one_minus), goes_on);
     path->from = select3(path->from, f->p, goes_on);
     path->from_world = select3(path->from_world, at, goes_on);
     path->throughput = select3(path->throughput, leaves, goes_on);
@@ -115,7 +116,7 @@ static inline Mask scatter(constant const View *view, constant const Scattering 
         Int which = choose_light(params, table, unit_open(s.c));
         Light l = light_of(params, table, which);
         LightRay ray = light_ray(&l, at, unit_open(s.a), unit_open(s.b));
-        Real density = phase_density(table, &m, clamp(dot3(f->d, ray.d), (Real)(-1.0f), (Real)(1.0f)));
+        Real density = phase_density(table, &m, one_minus_cosine(f->d, ray.d));
         Real own = l.chance * ray.density, share = select((Real)(1.0f), own / (own + density), MASK(own > 0.0f));
         Real3 light = scale3(times3(leaves, ray.light), density * share / l.chance);
         aims = goes_on & MASK(magnitude(light) > 0.0f);
@@ -211,5 +212,5 @@ kernel void volume_path(constant View *view, constant Scattering *params, VOLUME
             alive &= ~done;
         }
     }
-    if (tile.times > 0u) tiles[tile.cost_at] += steps;
+    if (tile.times > 0u) tiles[tile.cost_at] = add_sat(tiles[tile.cost_at], steps);
 }

@@ -82,6 +82,11 @@ impl Samples {
         self.known_variance(pixel) / f64::from(self.count_at(pixel).max(1))
     }
 
+    /// What a pixel adds to the denominator of Welch's degrees of freedom: its squared error's square over its own.
+    fn error_spread(&self, pixel: usize) -> f64 {
+        self.squared_error(pixel).powi(2) / f64::from(self.count_at(pixel).max(2) - 1)
+    }
+
     /// The deviation of the samples of each tile of `side` × `side` pixels, row by row: the root of their mean variance.
     pub fn deviations(&self, side: usize) -> Vec<f64> {
         let (wide, high) = (self.width.div_ceil(side), self.height.div_ceil(side));
@@ -151,6 +156,8 @@ pub struct Film {
     pub paired: bool,
     /// Whether the step plays no part in the picture: there is no error of it.
     pub stepless: bool,
+    /// Whether its samples are random: of one sample the error is told from how neighbours differ.
+    pub noisy: bool,
     /// Opacity at which rays end.
     pub opacity_threshold: f64,
     /// Relative change of the picture since the field had half its histories.
@@ -166,7 +173,11 @@ impl Film {
         let relative = |absolute: f64| if mean > 0.0 { absolute / mean } else { absolute };
         let pixels = self.main.pixels().max(1) as f64;
         let squared = |i: usize| Some(self.main.squared_error(i)).filter(|e| e.is_finite()).unwrap_or(0.0);
-        let noise = (self.main.count >= 2).then(|| ((0..self.main.pixels()).map(squared).sum::<f64>() / pixels).sqrt());
+        let noise = match self.main.count {
+            // Of noise a 2×2 block's mean takes a quarter of the variance away.
+            0 | 1 => self.noisy.then(|| self.main.resolution_error() * (4.0f64 / 3.0).sqrt()),
+            _ => Some(((0..self.main.pixels()).map(squared).sum::<f64>() / pixels).sqrt()),
+        };
         let truncation = self.truncation();
         let (discretisation, joint) = match (&self.control, self.main.stride) {
             (Some(control), 1) => self.against(control),

@@ -93,3 +93,23 @@ fn a_shadow_falls_where_the_sun_does_not_reach() {
     let bright = mean(&film(House::shared(), &scene("single_scatter", &volume, &camera, &own, 16, 16)));
     assert!(bright.0 > 0.01, "{bright:?}");
 }
+
+#[test]
+fn a_lamp_far_away_is_a_sun() {
+    // Ten million lengths away: nothing of it is lost in the angles under which the ray is seen.
+    let smoke = json!({"builtin": "smoke", "resolution": 32});
+    let run = |lights: Value, seed: u64| {
+        let own = json!({"medium": {"sigma_t_per_unit": 6, "albedo": 0.8}, "lights": lights});
+        let camera = json!({"eye": [1.0, 0.8, -2.5], "up": [0, 1, 0]});
+        let mut request = scene("single_scatter", &smoke, &camera, &own, 48, 256);
+        request["seed"] = json!(seed);
+        mean(&film(House::shared(), &request)).0
+    };
+    let sun = run(json!([{"type": "sun", "direction": [0.6, 0.8, 0], "irradiance": 1}]), 2);
+    for far in [1e3, 1e5, 1e7] {
+        let radius = 0.01 * far;
+        let lamp = json!([{"type": "sphere", "position": [0.6 * far, 0.8 * far, 0], "radius": radius, "radiance": 1e4 / std::f64::consts::PI}]);
+        let lamp = run(lamp, 1);
+        assert!((lamp / sun - 1.0).abs() < 0.02, "{far}: {lamp} and {sun}");
+    }
+}

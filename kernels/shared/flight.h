@@ -11,7 +11,7 @@
 #define COUNT_FIREFLIES 1
 #define COUNT_CLAMPED 2
 #define COUNT_BROKEN 3
-#define COUNT_CLAMPED_ENERGY 4 // two words, in units of 2^-16
+#define COUNT_CLAMPED_ENERGY 4 // two words, in units of 2^-16 of clamp_luminance
 #define COUNT_CUT 6
 // A path of more collisions than this is cut and counted.
 #define MOST_EVENTS 1000000u
@@ -69,7 +69,9 @@ static inline void aim(constant const View *view, constant const Scattering *par
 
 // The density of a raw value; what is not a number is empty.
 static inline Real density_of(constant const Scattering *params, Real raw) {
-    Real density = fmin(mad(raw, (Real)(params->density_scale), (Real)(params->density_offset)), (Real)(params->density_most));
+    // Comparisons, for fmin and fmax take what is not a number for their other argument.
+    Real density = mad(raw, (Real)(params->density_scale), (Real)(params->density_offset));
+    density = select(density, (Real)(params->density_most), MASK(density > params->density_most));
     return select((Real)(0.0f), density, MASK(density > 0.0f));
 }
 
@@ -239,7 +241,7 @@ static inline void finish(constant const View *view, constant const Scattering *
         if (any_lane(bright)) {
             atomic_add(&counts[COUNT_CLAMPED], (uint)count_lanes(bright));
             RealLanes taken;
-            taken.v = select((Real)(0.0f), fmin(y - params->clamp_luminance, (Real)(1e9f)), bright);
+            taken.v = select((Real)(0.0f), fmin(y / params->clamp_luminance - 1.0f, (Real)(1e9f)), bright);
             for (int i = 0; i < LANES; i++)
                 if (taken.lane[i] > 0.0f) atom_add((global ulong *)(counts + COUNT_CLAMPED_ENERGY), (ulong)(taken.lane[i] * 65536.0f));
             light = select3(light, scale3(light, params->clamp_luminance / y), bright);

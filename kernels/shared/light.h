@@ -67,7 +67,6 @@ static inline LightRay light_ray(const Light *l, Real3 at, Real u, Real v) {
     Mask disc = sphere | (sun & MASK(l->size > 0.0f));
     if (any_lane(disc)) {
         Real cone = select(l->size, cone_of(l->size, squared), sphere), one_minus = u * cone;
-        Real3 middle = ray.d;
         ray.d = select3(ray.d, turned(ray.d, one_minus, 2.0f - one_minus, v), disc);
         // A sun's irradiance is its radiance times pi sin^2 of its angular radius.
         Real radiance = select((Real)(1.0f), 1.0f / (0.5f * TURN * l->size * (2.0f - l->size)), sun);
@@ -78,7 +77,6 @@ static inline LightRay light_ray(const Light *l, Real3 at, Real u, Real v) {
         ray.length = select(ray.length, fmax(along_middle - half_chord, (Real)(0.0f)), sphere);
         // Nothing shines inside a sphere.
         ray.light = select3(ray.light, real3((Real)(0.0f), (Real)(0.0f), (Real)(0.0f)), sphere & MASK(cone >= 2.0f));
-        (void)middle;
     }
     if (any_lane(quad)) {
         Real3 normal = cross3(l->u, l->v); // as long as the area
@@ -113,7 +111,8 @@ static inline Real3 met(constant const Scattering *params, global const float *t
             Real squared = dot3(to_place, to_place), along_d = dot3(to_place, d);
             Real3 off = minus3(to_place, scale3(d, along_d));
             Real chord2 = (Real)(l[8] * l[8]) - dot3(off, off);
-            seen = MASK(chord2 > 0.0f) & MASK(squared > l[8] * l[8]);
+            // A flight that began before `at` may have met it there.
+            seen = MASK(chord2 > 0.0f) & (MASK(squared > l[8] * l[8]) | MASK(from < 0.0f));
             length = along_d - sqrt(fmax(chord2, (Real)(0.0f)));
             own = 1.0f / (TURN * cone_of((Real)(l[8]), squared));
         } else if (kind == LIGHT_QUAD) {

@@ -43,8 +43,10 @@ static inline void sample_lobe(Real g, Real u, Real *one_minus, Real *one_plus) 
     *one_plus = twice * ((1.0f + g) * (1.0f + g)) * (u * mad(-g, v, (Real)(1.0f)));
 }
 
-static inline Real lobe_density(Real g, Real mu) {
-    Real base = fmax(mad(-2.0f * g, mu, mad(g, g, (Real)(1.0f))), (Real)(1e-20f)), root = sqrt(base);
+// With 1 + g^2 - 2 g mu = (1 - |g|)^2 + 2 |g| (1 -+ mu), which loses no digits near the peak.
+static inline Real lobe_density(Real g, Real one_minus) {
+    Real size = fabs(g), off = select(one_minus, 2.0f - one_minus, MASK(g < 0.0f));
+    Real base = fmax(mad(2.0f * size, off, (1.0f - size) * (1.0f - size)), (Real)(1e-20f)), root = sqrt(base);
     return (1.0f - g * g) / (base * root) * 0.0795774715f;
 }
 
@@ -83,7 +85,7 @@ static inline Real table_density(global const float *table, Int first, Int rows,
     Int at = first + table_row(table, first, rows, 0, mu) * 3;
     Real low = gather_reals(table, at), p0 = gather_reals(table + 1, at);
     Real high = gather_reals(table + 3, at), p1 = gather_reals(table + 4, at);
-    return mad(p1 - p0, (mu - low) / (high - low), p0) * 0.159154943f;
+    return mad(p1 - p0, (mu - low) / fmax(high - low, (Real)(1e-30f)), p0) * 0.159154943f;
 }
 
 // 1 - cosine and 1 + cosine of a collision's angle, by the number u.
@@ -103,9 +105,16 @@ static inline void sample_phase(global const float *table, const Medium *m, Real
     *one_plus = select(*one_plus, 1.0f + mu, rayleigh | tabulated);
 }
 
-// The density per steradian of a turn of that cosine.
-static inline Real phase_density(global const float *table, const Medium *m, Real mu) {
-    Real density = mad(m->c, lobe_density(m->a, mu), (1.0f - m->c) * lobe_density(m->b, mu));
+// 1 - the cosine between two directions: |a - b|^2 / 2, which keeps its digits where they are nearly the same.
+static inline Real one_minus_cosine(Real3 a, Real3 b) {
+    Real3 off = real3(a.x - b.x, a.y - b.y, a.z - b.z);
+    return fmin(0.5f * dot3(off, off), (Real)(2.0f));
+}
+
+// The density per steradian of a turn of which 1 - the cosine is that.
+static inline Real phase_density(global const float *table, const Medium *m, Real one_minus) {
+    Real mu = 1.0f - one_minus;
+    Real density = mad(m->c, lobe_density(m->a, one_minus), (1.0f - m->c) * lobe_density(m->b, one_minus));
     Mask rayleigh = MASK(m->kind == PHASE_RAYLEIGH), tabulated = MASK(m->kind == PHASE_TABLE);
     density = select(density, 0.0596831037f * mad(mu, mu, (Real)(1.0f)), rayleigh);
     if (any_lane(tabulated)) {

@@ -11,7 +11,9 @@ const ALPHA: f64 = 0.01;
 /// |z| that is drawn in full colour.
 const FULL_COLOUR: f64 = 4.0;
 
-/// The judgement of two films of one size. z = (a − b) / √(s_a² + s_b²), with the standard errors of both pixels.
+/// The judgement of two films of one size. t = (a − b) / √(s_a² + s_b²), with the standard errors of both pixels, follows Student's
+/// distribution with Welch's degrees of freedom ν = (s_a² + s_b²)² / (s_a⁴ / (n_a − 1) + s_b⁴ / (n_b − 1)); z is the normal variable as
+/// improbable, √(ν ln(1 + t²/ν)) (8ν + 1) / (8ν + 3) (Wallace, Ann. Math. Stat. 30, 1959).
 #[derive(Debug, Clone, Serialize)]
 pub struct Difference {
     /// Pixels that were compared: all whose error is known, or that have none.
@@ -48,6 +50,13 @@ fn chi_squared_tail(x: f64, n: f64) -> f64 {
     0.5 * libm::erfc(((x / n).cbrt() - 1.0 + spread) / (2.0 * spread).sqrt())
 }
 
+/// The standard normal variable that is as improbable as Student's t of so many degrees of freedom.
+fn normal_score(t: f64, freedom: f64) -> f64 {
+    let freedom = freedom.clamp(1.0, 1e6);
+    let z = (freedom * (t * t / freedom).ln_1p()).sqrt() * (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0);
+    z.copysign(t)
+}
+
 /// The chance of the lesser of `n` independent p-values.
 fn least_of(p: f64, n: f64) -> f64 {
     -(n * (-p).ln_1p()).exp_m1()
@@ -77,7 +86,11 @@ impl Film {
                 if squared.is_finite() {
                     (sum, variance) = (sum + difference, variance + squared);
                 }
-                if difference.abs() <= rounding { 0.0 * squared } else { difference / squared.sqrt().max(1e-30) }
+                if difference.abs() <= rounding {
+                    return 0.0 * squared;
+                }
+                let freedom = squared * squared / (self.main.error_spread(i) + other.main.error_spread(i)).max(1e-300);
+                normal_score(difference / squared.sqrt().max(1e-30), freedom)
             })
             .collect();
         let pixels = z.iter().filter(|z| z.is_finite()).count();
@@ -181,6 +194,9 @@ mod tests {
 
     #[test]
     fn tails_are_those_of_the_tables() {
+        // Student's t of 10 degrees of freedom is beyond ±2.228 with a probability of 0.05, of 30 beyond ±2.042.
+        assert!((two_sided(normal_score(-2.228, 10.0)) - 0.05).abs() < 1e-3 && normal_score(-2.228, 10.0) < 0.0);
+        assert!((two_sided(normal_score(2.042, 30.0)) - 0.05).abs() < 1e-3);
         assert!((two_sided(1.959_964) - 0.05).abs() < 1e-6);
         assert!((chi_squared_tail(124.342, 100.0) - 0.05).abs() < 2e-4);
         assert!((chi_squared_tail(1074.679, 1000.0) - 0.05).abs() < 1e-4);

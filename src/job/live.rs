@@ -227,6 +227,10 @@ impl Live {
     /// variance of the mean itself, so it estimates the picture's standard error.
     fn compare_with_half(&mut self, context: &mut DeviceContext) -> Result<()> {
         let Some(view) = &self.view else { return Ok(()) };
+        if self.scene.as_ref().is_some_and(|s| s.view().least_samples() > 2) {
+            // Two pictures of one random sample differ by their own noise, whatever the field's.
+            return Ok(());
+        }
         let film = view.film(context)?;
         // From a new camera there is no picture of the half yet: the error seen from the last one stands in for it.
         if let Some(half) = &self.half {

@@ -10,6 +10,8 @@ use crate::film::Tiles;
 
 /// The part of the mean deviation that every tile has at least.
 const FLOOR: f64 = 0.25;
+/// About how many samples a tile gets in a pass at most: its samples are taken one after the other, and a pass must not wait for long.
+const MOST: f64 = 16.0;
 /// Samples before any deviation is believed.
 pub(super) const BEGIN: u32 = 16;
 
@@ -50,8 +52,9 @@ impl Tiling {
         let weight = |(d, c): (&f64, f64)| if mean > 0.0 { (d + FLOOR * mean) / c.sqrt() } else { 1.0 };
         let weights: Vec<f64> = deviations.iter().zip(each).map(weight).collect();
         let scale = f64::from(samples + passes) * tiles / weights.iter().sum::<f64>();
+        let most = MOST * f64::from(passes);
         let wanted: Vec<f64> =
-            weights.iter().zip(&self.counts).map(|(w, n)| (w * scale - f64::from(*n)).max(0.0)).collect();
+            weights.iter().zip(&self.counts).map(|(w, n)| (w * scale - f64::from(*n)).clamp(0.0, most)).collect();
         let scale = f64::from(passes) * tiles / wanted.iter().sum::<f64>().max(1e-30);
         let mut sum = 0.0f64;
         let share = |w: &f64| {

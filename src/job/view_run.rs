@@ -57,6 +57,8 @@ pub(super) struct ViewRun {
     longest: f64,
     least_step: f32,
     adaptive: bool,
+    noisy: bool,
+    clamp_luminance: f64,
     /// Device time since the start.
     pub device_time: Duration,
 }
@@ -97,6 +99,8 @@ impl ViewRun {
             longest,
             least_step: (LEAST_STEP_VOXELS * smallest) as f32,
             adaptive: scene.view().adaptive(),
+            noisy: scene.view().least_samples() > 2,
+            clamp_luminance: scene.view().clamp_luminance(),
             plan,
             volume: on_device,
             distances,
@@ -267,6 +271,7 @@ impl ViewRun {
             control,
             paired: self.paired(),
             stepless: self.plan.stepless,
+            noisy: self.noisy,
             opacity_threshold,
             ..Film::default()
         })
@@ -277,7 +282,7 @@ impl ViewRun {
         let mut counts = [0u32; 8];
         context.device.read(&self.counts, 0, &mut counts)?;
         let [non_finite, fireflies, clamped, broken, low, high, cut, _] = counts;
-        let clamped_luminance = (u64::from(high) << 32 | u64::from(low)) as f64 / 65536.0;
+        let clamped_luminance = (u64::from(high) << 32 | u64::from(low)) as f64 / 65536.0 * self.clamp_luminance;
         Ok(SampleCounts { non_finite, fireflies, clamped, broken, clamped_luminance, cut })
     }
 }

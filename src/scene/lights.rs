@@ -125,6 +125,9 @@ impl LightSource {
     }
 
     fn check(&self, at: &str) -> Result<()> {
+        if self.kind.is_empty() {
+            return Err(Error::invalid(format!("{at}/type"), "missing", "sun, sky, point, sphere, quad"));
+        }
         let [needed, permitted] = self.fields();
         for (name, given) in self.given() {
             let at = format!("{at}/{name}");

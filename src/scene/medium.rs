@@ -95,10 +95,18 @@ impl MediumRequest {
         }
         self.albedo.check(&format!("{at}/albedo"), 0.0, 1.0)?;
         self.emission.check(&format!("{at}/emission"), 0.0, 1e9)?;
+        let two = self.phase.kind == "two_term_henyey_greenstein" && self.phase.weight > 0.0 && self.phase.weight < 1.0;
+        for (name, g) in [("g1", self.phase.g1), ("g2", self.phase.g2)] {
+            if two && g.abs() == 1.0 {
+                let detail = "light that is not turned at all has no density to weigh beside the other lobe's";
+                return Err(Error::invalid(format!("{at}/phase/{name}"), detail, "above -1 and below 1"));
+            }
+        }
         self.phase.check(&format!("{at}/phase"))?;
         match self.density_window {
-            Some([low, high]) if low == high || !(low.abs() <= 1e30 && high.abs() <= 1e30) => {
-                Err(Error::invalid(format!("{at}/density_window"), "its ends are the same", "two values"))
+            Some([low, high]) if !((high - low).abs() >= 1e-30 && low.abs() <= 1e30 && high.abs() <= 1e30) => {
+                let permitted = "two values from -1e30 to 1e30, 1e-30 or more apart";
+                Err(Error::invalid(format!("{at}/density_window"), "its ends are the same, or too large", permitted))
             }
             _ => Ok(()),
         }

@@ -158,6 +158,10 @@ pub trait View: Send + Sync {
     fn adaptive(&self) -> bool {
         false
     }
+    /// The luminance that brighter samples are scaled down to; 0 where none are.
+    fn clamp_luminance(&self) -> f64 {
+        0.0
+    }
     /// Samples per pixel before which a render does not stop for its error: of fewer the error itself is not known.
     fn least_samples(&self) -> u32 {
         2

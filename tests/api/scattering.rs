@@ -73,6 +73,12 @@ async fn mistakes_are_named_where_they_were_made() {
         ("single_scatter", json!({"medium": {"index": 1.5}, "lights": []}), "/medium/index"),
         ("single_scatter", json!({"lights": [{"type": "moon"}]}), "/lights/0/type"),
         ("single_scatter", json!({"lights": [{"type": "point"}]}), "/lights/0/position"),
+        ("single_scatter", json!({"lights": [{}]}), "/lights/0/type"),
+        (
+            "volume_path",
+            json!({"medium": {"phase": {"type": "two_term_henyey_greenstein", "g1": 1}}}),
+            "/medium/phase/g1",
+        ),
         (
             "single_scatter",
             json!({"lights": [{"type": "point", "position": [0, 0, 0], "radius": 1}]}),

@@ -133,3 +133,44 @@ fn a_broken_majorant_is_biased_and_said_to_be() {
     assert!(flagged && counted > 0, "{counted}");
     assert!(wrong - right > 20.0 * error, "{wrong} {right}");
 }
+
+#[test]
+fn beside_voxels_that_are_not_a_number_the_rest_is_as_it_is() {
+    // The half x > 0 of density 1, beside nothing and beside NaN: of the nearest voxels, the same.
+    let half = |other: f64| House::shared().floats([16, 16, 16], move |x, _, _| if x < 0.0 { other } else { 1.0 });
+    let sun = json!([{"type": "sun", "direction": [0.3, 1, 0.2]}, {"type": "sky", "radiance": 0.1, "up": [0, 1, 0]}]);
+    for technique in ["volume_path", "single_scatter"] {
+        for tracking in ["delta", "weighted", "exact", "march"] {
+            let run = |other: f64, seed: u64| {
+                let own = json!({"medium": {"sigma_t_per_unit": 3}, "lights": sun, "tracking": tracking, "interpolation": "nearest"});
+                let camera = json!({"eye": [3.0, 0.5, 1.0], "up": [0, 1, 0], "fov_y_deg": 30});
+                let mut request = scene(technique, &half(other), &camera, &own, 32, 64);
+                request["seed"] = json!(seed);
+                let job = House::shared().finish(&request);
+                assert_eq!(job.resource()["counts"]["broken_majorants"], 0, "{technique} {tracking}");
+                let film = job.film().unwrap().0;
+                finite(&film);
+                film
+            };
+            super::common::light::same_picture(&run(f64::NAN, 1), &run(0.0, 2), &format!("{technique}, {tracking}"));
+        }
+    }
+}
+
+#[test]
+fn a_lamp_that_sticks_out_of_the_volume_is_seen() {
+    let lights = json!([{"type": "sphere", "position": [0, 0, 1], "radius": 0.3, "radiance": 4}]);
+    let own = json!({"medium": {"sigma_t_per_unit": 1e-6}, "lights": lights});
+    for technique in ["volume_path", "single_scatter"] {
+        let request = scene(
+            technique,
+            &json!({"builtin": "constant", "resolution": 8}),
+            &spot([0.0, 0.0, 1.0], 0.1),
+            &own,
+            8,
+            16,
+        );
+        let (m, _) = mean(&film(House::shared(), &request));
+        assert!((m - 4.0).abs() < 1e-3, "{technique}: {m}");
+    }
+}

@@ -116,3 +116,13 @@ fn the_same_bytes_with_one_lane_within_rounding() {
     let (again, first) = (run(House::shared()), run(House::shared()));
     assert_eq!(again.main.mean, first.main.mean);
 }
+
+#[test]
+fn of_one_sample_the_error_is_told_from_the_neighbours() {
+    let error = |samples: u32| {
+        let job = House::shared().finish(&scene("volume_path", &smoke(), &camera(), &own(&json!({})), 64, samples));
+        job.resource()["error"].as_f64().unwrap()
+    };
+    let (one, many) = (error(1), 16.0 * error(256));
+    assert!((0.5..2.0).contains(&(one / many)), "{one} of one sample, {many} by 256");
+}

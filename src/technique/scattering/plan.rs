@@ -36,6 +36,8 @@ static FEATURES: [Features; 8] = {
     ]
 };
 
+/// Steps of less than this part of a volume's voxels along an axis are lost in single precision.
+const LOST: f64 = 1.0 / (1u64 << 20) as f64;
 /// Voxels that the mean density is taken of.
 const MEAN_OF: usize = 4096;
 
@@ -132,6 +134,18 @@ impl Scatterer {
         (FEATURES.iter().find(|f| **f == wanted).unwrap_or(&FEATURES[0]), format!("tracking {why}"))
     }
 
+    /// A march whose step is lost in the rounding of places along some axis would never end.
+    fn check_march(&self, volume: &Volume) -> Result<()> {
+        let largest = volume.spacing().into_iter().fold(0.0, f64::max);
+        let most = volume.dims().into_iter().max().unwrap_or(1) as f64;
+        let least = most * LOST * largest / Self::smallest_voxel(volume);
+        if self.parameters.tracking != Tracking::March || self.parameters.march_step_voxels >= least {
+            return Ok(());
+        }
+        let at = format!("/{}/march_step_voxels", self.kernel);
+        Err(Error::invalid(at, "too short for voxels of so different sides", format!("at least {least:.3}")))
+    }
+
     fn smallest_voxel(volume: &Volume) -> f64 {
         volume.spacing().into_iter().fold(f64::INFINITY, f64::min)
     }
@@ -181,6 +195,7 @@ impl Scatterer {
 
 impl View for Scatterer {
     fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
+        self.check_march(volume)?;
         let (features, why) = self.features(volume);
         let variant = Variant { kernel: self.kernel, voxel: Some(volume.voxel_type()), features };
         let sigma = self.parameters.medium.sigma_t_per_unit(volume);
@@ -255,6 +270,10 @@ impl View for Scatterer {
 
     fn adaptive(&self) -> bool {
         self.parameters.adaptive
+    }
+
+    fn clamp_luminance(&self) -> f64 {
+        self.parameters.clamp_luminance.unwrap_or(0.0)
     }
 
     fn least_samples(&self) -> u32 {
