@@ -5,18 +5,14 @@
 
 #[path = "../tests/common/mod.rs"]
 mod common;
+mod posts;
 
 use std::process::Command;
 use std::time::Instant;
 
-use common::Server;
+use common::with;
+use posts::{Bench, median};
 use serde_json::{Value, json};
-
-struct Bench {
-    server: Server,
-    client: reqwest::Client,
-    runtime: tokio::runtime::Runtime,
-}
 
 /// What a simulation came to.
 struct Run {
@@ -25,62 +21,28 @@ struct Run {
     wall_per_ms: f64,
 }
 
-fn with(scene: &Value, more: &Value) -> Value {
-    let mut all = scene.clone();
-    all.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
-    all
+/// Posts the simulation and waits for its picture, then asks for the result, and for the grid where it is wanted.
+fn run_with_field(bench: &Bench, scene: &Value, wanted: bool) -> (Run, Vec<f32>) {
+    let body = json!({"technique": "emission_absorption", "volume": {"photon_transport": scene},
+        "image": {"width": 8, "height": 8}, "budget": {"samples": 1}});
+    let started = Instant::now();
+    let (place, _) = bench.picture(&body, "png");
+    let wall_s = started.elapsed().as_secs_f64();
+    let mut grid = Vec::new();
+    if wanted {
+        let nrrd = bench.get(&format!("{place}/field"));
+        let start = nrrd.windows(2).position(|w| w == b"\n\n").unwrap() + 2;
+        grid.extend(nrrd[start..].chunks_exact(4).map(|c| f32::from_le_bytes(c.try_into().unwrap())));
+    }
+    let resource = bench.resource(&place);
+    let result = resource["result"].clone();
+    let photons = result["photons"].as_f64().unwrap_or_else(|| panic!("{resource}"));
+    let photons_per_ms = result["photons_per_ms"].as_f64().unwrap();
+    (Run { photons_per_ms, wall_per_ms: photons / wall_s / 1e3, result }, grid)
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
-}
-
-impl Bench {
-    fn new(environment: &[(&str, &str)]) -> Self {
-        let device = std::env::var("DEVICE").unwrap_or_else(|_| "pocl".into());
-        let server = Server::start_env(&["--device", &device], environment);
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
-        Self { server, client: reqwest::Client::builder().no_proxy().build().unwrap(), runtime }
-    }
-
-    fn upload(&self, voxels: Vec<u8>) -> String {
-        let url = format!("{}/v1/volumes?dims=60,60,60&type=u8&spacing=1,1,1", self.server.url());
-        let upload = self.client.post(url).header("Content-Type", "application/octet-stream").body(voxels);
-        let reply: Value = self.runtime.block_on(async { upload.send().await.unwrap().json().await.unwrap() });
-        reply["id"].as_str().unwrap_or_else(|| panic!("{reply}")).to_owned()
-    }
-
-    /// Posts the simulation and waits for its picture, then asks for the result.
-    fn run(&self, scene: &Value) -> Run {
-        self.run_with_field(scene, false).0
-    }
-
-    /// The same with the grid, where it is wanted.
-    fn run_with_field(&self, scene: &Value, wanted: bool) -> (Run, Vec<f32>) {
-        let body = json!({"technique": "emission_absorption", "volume": {"photon_transport": scene},
-            "image": {"width": 8, "height": 8}, "budget": {"samples": 1}});
-        let started = Instant::now();
-        self.runtime.block_on(async {
-            let url = format!("{}/v1/renders", self.server.url());
-            let reply: Value = self.client.post(url).json(&body).send().await.unwrap().json().await.unwrap();
-            let id = reply["id"].as_str().unwrap_or_else(|| panic!("{reply}"));
-            let url = format!("{}/v1/renders/{id}", self.server.url());
-            self.client.get(format!("{url}/frame.png?wait=final")).send().await.unwrap().error_for_status().unwrap();
-            let wall_s = started.elapsed().as_secs_f64();
-            let mut grid = Vec::new();
-            if wanted {
-                let nrrd = self.client.get(format!("{url}/field")).send().await.unwrap().bytes().await.unwrap();
-                let start = nrrd.windows(2).position(|w| w == b"\n\n").unwrap() + 2;
-                grid.extend(nrrd[start..].chunks_exact(4).map(|c| f32::from_le_bytes(c.try_into().unwrap())));
-            }
-            let resource: Value = self.client.get(url).send().await.unwrap().json().await.unwrap();
-            let result = resource["result"].clone();
-            let photons = result["photons"].as_f64().unwrap_or_else(|| panic!("{resource}"));
-            let photons_per_ms = result["photons_per_ms"].as_f64().unwrap();
-            (Run { photons_per_ms, wall_per_ms: photons / wall_s / 1e3, result }, grid)
-        })
-    }
+fn run(bench: &Bench, scene: &Value) -> Run {
+    run_with_field(bench, scene, false).0
 }
 
 fn cube60() -> Value {
@@ -104,15 +66,17 @@ fn spheres(bench: &Bench) -> Value {
         });
     }
     let medium = |a: f64, s: f64, g: f64| json!({"mu_a_per_mm": a, "mu_s_per_mm": s, "index": 1.37, "phase": {"type": "henyey_greenstein", "g": g}});
-    json!({"labels": {"id": bench.upload(voxels)}, "time_gate_ns": 5, "tally": "absorbed", "boundary": {"fresnel": true, "specular_entry": false},
+    json!({"labels": {"id": bench.upload(voxels, 60, "u8", 60.0)}, "time_gate_ns": 5, "tally": "absorbed", "boundary": {"fresnel": true, "specular_entry": false},
         "media": [medium(0.02, 7.0, 0.89), medium(0.004, 0.009, 0.89), medium(0.02, 9.0, 0.89), medium(0.05, 0.5, 0.9)],
         "source": {"type": "pencil", "position_mm": [30, 30.1, 0]}})
 }
 
 /// The cube as a grid of labels, so that voxels are traversed one by one.
 fn voxel_cube(bench: &Bench) -> Value {
-    let mut scene =
-        with(&cube60(), &json!({"labels": {"id": bench.upload(vec![0; 216_000])}, "media": [cube60()["medium"]]}));
+    let mut scene = with(
+        &cube60(),
+        &json!({"labels": {"id": bench.upload(vec![0; 216_000], 60, "u8", 60.0)}, "media": [cube60()["medium"]]}),
+    );
     scene.as_object_mut().unwrap().remove("medium");
     scene
 }
@@ -140,9 +104,9 @@ fn against_mcx(bench: &Bench) {
         let scene = with(&scene, &json!({"photons": photons}));
         let (mut device, mut wall, mut kernel, mut their_wall, mut absorbed) =
             (vec![], vec![], vec![], vec![], json!([null, null]));
-        bench.run(&with(&scene, &json!({"photons": 10_000})));
+        run(bench, &with(&scene, &json!({"photons": 10_000})));
         for _ in 0..3 {
-            let ours = bench.run(&scene);
+            let ours = run(bench, &scene);
             device.push(ours.photons_per_ms);
             wall.push(ours.wall_per_ms);
             absorbed[0] = ours.result["ledger"]["absorbed"]["value"].clone();
@@ -190,7 +154,7 @@ fn settings(bench: &Bench) {
             let grids: Vec<Vec<f32>> = (0..fields)
                 .map(|seed| {
                     let scene = with(&with(&scene, &setting), &json!({"photons": photons, "seed": seed}));
-                    let run = bench.run_with_field(&scene, true);
+                    let run = run_with_field(bench, &scene, true);
                     per_photon_s.push(1e-3 / run.0.photons_per_ms);
                     run.1
                 })
@@ -230,7 +194,7 @@ fn threads() {
     let scene = with(&cube60(), &json!({"photons": 2_000_000}));
     let (mut single, mut every, mut ratio) = (vec![], vec![], vec![]);
     for _ in 0..5 {
-        let (a, b) = (one.run(&scene).photons_per_ms, all.run(&scene).photons_per_ms);
+        let (a, b) = (run(&one, &scene).photons_per_ms, run(&all, &scene).photons_per_ms);
         single.push(a);
         every.push(b);
         ratio.push(b / a);

@@ -5,17 +5,13 @@
 
 #[path = "../tests/common/mod.rs"]
 mod common;
+mod posts;
 
 use std::process::Command;
 
-use common::Server;
+use common::with;
+use posts::{Bench, median};
 use serde_json::{Value, json};
-
-struct Bench {
-    server: Server,
-    client: reqwest::Client,
-    runtime: tokio::runtime::Runtime,
-}
 
 /// What a render came to: its relative error, its mean luminance, and seconds on the device and until it was done.
 struct Run {
@@ -26,58 +22,23 @@ struct Run {
     first_frame_ms: f64,
 }
 
-fn with(scene: &Value, more: &Value) -> Value {
-    let mut all = scene.clone();
-    all.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
-    all
+/// Uploads n³ floats on [-1, 1]³.
+fn upload(bench: &Bench, n: usize, value: impl Fn(f64, f64, f64) -> f64) -> Value {
+    let at = |i: usize| (i as f64 + 0.5) / n as f64 * 2.0 - 1.0;
+    let values = (0..n * n * n).map(|i| value(at(i % n), at(i / n % n), at(i / n / n)) as f32);
+    json!({"id": bench.upload(values.flat_map(f32::to_le_bytes).collect(), n, "f32", 2.0)})
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
-}
-
-impl Bench {
-    fn new() -> Self {
-        let device = std::env::var("DEVICE").unwrap_or_else(|_| "pocl".into());
-        let server = Server::start_with(&["--device", &device]);
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
-        Self { server, client: reqwest::Client::builder().no_proxy().build().unwrap(), runtime }
-    }
-
-    /// Uploads n³ floats on [-1, 1]³.
-    fn upload(&self, n: usize, value: impl Fn(f64, f64, f64) -> f64) -> Value {
-        let at = |i: usize| (i as f64 + 0.5) / n as f64 * 2.0 - 1.0;
-        let values = (0..n * n * n).map(|i| value(at(i % n), at(i / n % n), at(i / n / n)) as f32);
-        let body: Vec<u8> = values.flat_map(f32::to_le_bytes).collect();
-        let url = format!(
-            "{}/v1/volumes?dims={n},{n},{n}&type=f32&spacing={s},{s},{s}",
-            self.server.url(),
-            s = 2.0 / n as f64
-        );
-        let upload = self.client.post(url).header("Content-Type", "application/octet-stream").body(body);
-        let reply: Value = self.runtime.block_on(async { upload.send().await.unwrap().json().await.unwrap() });
-        json!({"id": reply["id"].as_str().unwrap_or_else(|| panic!("{reply}"))})
-    }
-
-    fn run(&self, request: &Value) -> Run {
-        self.runtime.block_on(async {
-            let url = format!("{}/v1/renders", self.server.url());
-            let reply: Value = self.client.post(url).json(request).send().await.unwrap().json().await.unwrap();
-            let id = reply["id"].as_str().unwrap_or_else(|| panic!("{reply}"));
-            let url = format!("{}/v1/renders/{id}", self.server.url());
-            let exr =
-                self.client.get(format!("{url}/frame.exr?wait=final")).send().await.unwrap().bytes().await.unwrap();
-            let resource: Value = self.client.get(url).send().await.unwrap().json().await.unwrap();
-            let ms = |name: &str| resource["timings"][name].as_f64().unwrap();
-            Run {
-                error: resource["error"].as_f64().unwrap(),
-                mean: mean_luminance(&exr),
-                device_s: ms("device_ms") / 1e3,
-                elapsed_s: ms("elapsed_ms") / 1e3,
-                first_frame_ms: ms("first_frame_ms"),
-            }
-        })
+fn run(bench: &Bench, request: &Value) -> Run {
+    let (place, exr) = bench.picture(request, "exr");
+    let resource = bench.resource(&place);
+    let ms = |name: &str| resource["timings"][name].as_f64().unwrap();
+    Run {
+        error: resource["error"].as_f64().unwrap(),
+        mean: mean_luminance(&exr),
+        device_s: ms("device_ms") / 1e3,
+        elapsed_s: ms("elapsed_ms") / 1e3,
+        first_frame_ms: ms("first_frame_ms"),
     }
 }
 
@@ -119,17 +80,17 @@ fn against_mitsuba(bench: &Bench) {
         "| RMSE × √s | device | delivered | Mitsuba | Mitsuba against delivered | as a speed at equal error | mean, ours | mean, Mitsuba | z |\n|---|---|---|---|---|---|---|---|---|"
     );
     let cloud = scene(
-        &bench.upload(64, ripples),
+        &upload(bench, 64, ripples),
         &json!({"medium": {"sigma_t_per_unit": 20, "albedo": 0.9}, "lights": lights()}),
         256,
     );
     let constant = json!({"builtin": "constant", "resolution": 8});
     let cube = scene(&constant, &json!({"medium": {"sigma_t_per_unit": 2, "albedo": 0.9}, "lights": lights()}), 512);
     for (name, request) in [("cloud", cloud), ("cube", cube)] {
-        bench.run(&with(&request, &json!({"budget": {"samples": 2}})));
+        run(bench, &with(&request, &json!({"budget": {"samples": 2}})));
         let (mut device, mut delivered, mut theirs, mut means, mut peers) = (vec![], vec![], vec![], vec![], vec![]);
         for seed in 0..5 {
-            let run = bench.run(&with(&request, &json!({"seed": seed})));
+            let run = run(bench, &with(&request, &json!({"seed": seed})));
             let rmse = run.error * run.mean;
             device.push(rmse * run.device_s.sqrt());
             delivered.push(rmse * run.elapsed_s.sqrt());
@@ -180,11 +141,11 @@ fn settings(bench: &Bench) {
     let wide = json!([{"type": "sun", "direction": [0.5, -0.6, 0.8], "irradiance": 3, "angular_diameter_deg": 30}, {"type": "sky", "radiance": 0.3}]);
     let lamp = json!([{"type": "sphere", "position": [1, -1, 1], "radius": 0.3, "radiance": 10}]);
     let shell =
-        bench.upload(64, |x, y, z| if ((x * x + y * y + z * z).sqrt() - 0.8).abs() < 0.05 { 1.0 } else { 0.01 });
+        upload(bench, 64, |x, y, z| if ((x * x + y * y + z * z).sqrt() - 0.8).abs() < 0.05 { 1.0 } else { 0.01 });
     for (name, volume, own) in [
         (
             "cloud",
-            bench.upload(64, ripples),
+            upload(bench, 64, ripples),
             json!({"medium": {"sigma_t_per_unit": 20, "albedo": 0.9}, "lights": wide}),
         ),
         (
@@ -204,17 +165,15 @@ fn settings(bench: &Bench) {
             for (i, (_, setting)) in SETTINGS.iter().enumerate() {
                 let setting: Value = serde_json::from_str(setting).unwrap();
                 let request = with(&scene(&volume, &with(&own, &setting), 96), &json!({"seed": seed}));
-                let run = bench.run(&request);
                 if seed == 0 {
-                    // The first has built the kernel; its time does not count.
-                    rows[i].push(f64::NAN);
+                    // Builds the kernel; its time does not count.
+                    run(bench, &request);
                 }
-                let run = if seed == 0 { bench.run(&request) } else { run };
+                let run = run(bench, &request);
                 rows[i].push((run.error * run.mean).powi(2) * run.device_s);
             }
         }
-        let medians: Vec<f64> =
-            rows.into_iter().map(|r| median(r.into_iter().filter(|v| v.is_finite()).collect())).collect();
+        let medians: Vec<f64> = rows.into_iter().map(median).collect();
         let shown: Vec<String> = medians.iter().map(|v| format!("{:.2}", v / medians[0])).collect();
         println!("| {name} | {} |", shown.join(" | "));
     }
@@ -224,8 +183,8 @@ fn first_frames(bench: &Bench) {
     println!("\n| 512², time until the first picture, ms, median (longest) of 9 | |\n|---|---|");
     for technique in ["single_scatter", "volume_path"] {
         let request = json!({"technique": technique, "budget": {"samples": 16}});
-        bench.run(&request);
-        let times: Vec<f64> = (0..9).map(|_| bench.run(&request).first_frame_ms).collect();
+        run(bench, &request);
+        let times: Vec<f64> = (0..9).map(|_| run(bench, &request).first_frame_ms).collect();
         let longest = times.iter().copied().fold(0.0, f64::max);
         println!("| {technique} | {:.0} ({longest:.0}) |", median(times));
     }
@@ -234,7 +193,7 @@ fn first_frames(bench: &Bench) {
 fn main() {
     let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
     let asked = |name: &str| wanted.is_empty() || wanted.iter().any(|w| w == name);
-    let bench = Bench::new();
+    let bench = Bench::new(&[]);
     if asked("mitsuba") {
         against_mitsuba(&bench);
     }

@@ -20,40 +20,24 @@ typedef struct {
     Real density;                // of the phase function's direction
 } Sample;
 
-static inline void add_light(Sample *s, Real3 light, Mask on) { s->light = select3(s->light, add3(s->light, light), on); }
-
 static inline void begin(constant const View *view, constant const Scattering *params, Int column, Int row, Mask fresh, Sample *s) {
     Flight *f = &s->flight;
-    float2 place = place_in_pixel(f->sample);
-    Real x = to_real(column * view->stride) + place.x, y = to_real(row * view->stride) + place.y;
-    Ray ray = camera_ray(view, x, y);
-    Mask meets = MASK(ray.t_far > ray.t_near);
-    Real eye = eye_on_ray(view, x, y), entry = select(eye, ray.t_near, meets);
-    Real3 none = real3((Real)(0.0f), (Real)(0.0f), (Real)(0.0f));
+    Sight sight = look(view, params, place_in_pixel(f->sample), column, row, fresh, f);
     s->at = select(s->at, row * view->width + column, fresh);
     s->task = select(s->task, (Int)(0), fresh);
-    s->light = select3(s->light, none, fresh);
+    s->light = select3(s->light, real3((Real)(0.0f), (Real)(0.0f), (Real)(0.0f)), fresh);
     s->alpha = select(s->alpha, (Real)(1.0f), fresh);
     s->met &= ~fresh;
-    s->entry = select3(s->entry, along(ray.origin, ray.direction, entry), fresh);
-    s->entry_world = select3(s->entry_world, world_of(params, s->entry), fresh);
-    s->d = select3(s->d, ray_world(view, x, y), fresh);
-    s->length = select(s->length, select((Real)(0.0f), ray.t_far - ray.t_near, meets), fresh);
-    s->t_from = select(s->t_from, eye - entry, fresh);
-    f->number = as_UInt(select(as_Int(f->number), row * view->stride * view->full_width + column * view->stride, fresh));
-    f->event = as_UInt(select(as_Int(f->event), (Int)(1), fresh));
-    f->p = select3(f->p, s->entry, fresh);
-    f->d = select3(f->d, s->d, fresh);
-    f->carried = select3(f->carried, real3((Real)(1.0f), (Real)(1.0f), (Real)(1.0f)), fresh);
-    f->weight = select(f->weight, (Real)(1.0f), fresh);
-    f->left = select(f->left, select((Real)(0.0f), (Real)(1e30f), meets), fresh);
-    f->depth = select(f->depth, free_depth(draw(view, f, 1).a), fresh);
-    f->ratio &= ~fresh;
+    s->entry = select3(s->entry, f->p, fresh);
+    s->entry_world = select3(s->entry_world, world_of(params, f->p), fresh);
+    s->d = select3(s->d, f->d, fresh);
+    s->length = select(s->length, sight.length, fresh);
+    s->t_from = select(s->t_from, sight.eye - sight.entry, fresh);
     aim(view, params, fresh, f);
 }
 
-// The density of the length t by the angle under which the light is seen, and of the free flight on average; and, given the number u, a
-// length by that angle.
+// The density of the length t by the angle under which the light is seen; and, where it is to `choose` one, a length by that angle from the
+// number u.
 static inline Real by_angle(const Sample *s, const Light *l, Real u, Mask choose, Real *t) {
     Real3 middle = select3(l->place, along(along(l->place, l->u, (Real)(0.5f)), l->v, (Real)(0.5f)), MASK(l->kind == LIGHT_QUAD));
     Real3 to = minus3(middle, s->entry_world);
@@ -72,8 +56,8 @@ static inline Real by_angle(const Sample *s, const Light *l, Real u, Mask choose
 static inline Real by_flight(constant const Scattering *params, Real t) { return params->sigma_mean * exp(-params->sigma_mean * t); }
 
 // The light that reaches a place from a light, scattered towards the eye, with the part of it that is not left to the phase function.
-static inline Real3 lit(constant const Scattering *params, global const float *table, const Sample *s, const Light *l, Real3 at, Real3 from,
-                        UInt4Lanes r, LightRay *ray) {
+static inline Real3 lit(constant const Scattering *params, global const float *table, const Light *l, Real3 at, Real3 from, UInt4Lanes r,
+                        LightRay *ray) {
     Medium m = phase_of(params);
     *ray = light_ray(l, at, unit_open(r.a), unit_open(r.b));
     Real density = phase_density(table, &m, one_minus_cosine(from, ray->d));
@@ -81,32 +65,20 @@ static inline Real3 lit(constant const Scattering *params, global const float *t
     return scale3(ray->light, density * share);
 }
 
-static inline void to_light(const LightRay *ray, Real3 carried, UInt bits, Mask on, Flight *f) {
-    f->carried = select3(f->carried, carried, on);
-    f->d = select3(f->d, ray->d, on);
-    f->left = select(f->left, ray->length, on);
-    f->weight = select(f->weight, (Real)(1.0f), on);
-    f->depth = select(f->depth, free_depth(bits), on);
-    f->ratio |= on;
-}
-
-static inline Mask shines(Real3 c) { return MASK(fabs(c.x) + fabs(c.y) + fabs(c.z) > 0.0f); }
-
 // Flights to light `which` from the collision.
 static inline Mask from_collision(constant const View *view, constant const Scattering *params, global const float *table, Mask on, Int which, Sample *s) {
     Flight *f = &s->flight;
     UInt4Lanes r = draw(view, f, 1);
     Light l = light_of(params, table, which);
     LightRay ray;
-    Real3 light = times3(s->scattered, lit(params, table, s, &l, s->place_world, s->d, r, &ray));
+    Real3 light = times3(s->scattered, lit(params, table, &l, s->place_world, s->d, r, &ray));
     if (params->equiangular) {
         Real3 way = minus3(s->place_world, s->entry_world);
         Real t = sqrt(dot3(way, way)), mean = by_flight(params, t), angle = by_angle(s, &l, (Real)(0.5f), (Mask)(0), &t);
         light = select3(light, scale3(light, mean / (mean + angle)), MASK(l.kind != LIGHT_SUN));
     }
-    on &= shines(light);
-    f->p = select3(f->p, s->place, on);
-    to_light(&ray, light, r.c, on, f);
+    on &= MASK(magnitude(light) > 0.0f);
+    fly_to(s->place, ray.d, ray.length, light, free_depth(r.c), on, f);
     return on;
 }
 
@@ -118,13 +90,7 @@ static inline Mask to_sky(constant const View *view, constant const Scattering *
     Real one_minus, one_plus;
     sample_phase(table, &m, unit_open(r.a), &one_minus, &one_plus);
     s->density = select(s->density, phase_density(table, &m, one_minus), on);
-    f->p = select3(f->p, s->place, on);
-    f->d = select3(f->d, turned(s->d, one_minus, one_plus, unit_open(r.b)), on);
-    f->carried = select3(f->carried, s->scattered, on);
-    f->weight = select(f->weight, (Real)(1.0f), on);
-    f->left = select(f->left, (Real)(1e30f), on);
-    f->depth = select(f->depth, free_depth(r.c), on);
-    f->ratio &= ~on;
+    fly_on(s->place, turned(s->d, one_minus, one_plus, unit_open(r.b)), s->scattered, free_depth(r.c), on, f);
     return on;
 }
 
@@ -136,15 +102,8 @@ static inline Mask to_place(constant const View *view, constant const Scattering
     on &= MASK(l.kind != LIGHT_SUN) & MASK(s->length > 0.0f);
     Real t = (Real)(0.0f), angle = by_angle(s, &l, unit_open(r.a), (Mask)(-1), &t);
     Real over = 1.0f / (angle + by_flight(params, t));
-    #define SCATTERS(i) (params->sigma_t[i] * params->albedo[i]) * over
-    f->carried = select3(f->carried, real3(SCATTERS(0), SCATTERS(1), SCATTERS(2)), on);
-    #undef SCATTERS
-    f->p = select3(f->p, s->entry, on);
-    f->d = select3(f->d, s->d, on);
-    f->left = select(f->left, t, on);
-    f->weight = select(f->weight, (Real)(1.0f), on);
-    f->depth = select(f->depth, free_depth(r.b), on);
-    f->ratio |= on;
+    Real3 each = scale3(real3((Real)(params->sigma_t[0]), (Real)(params->sigma_t[1]), (Real)(params->sigma_t[2])), over);
+    fly_to(s->entry, s->d, t, by_colour(each, params->albedo), free_depth(r.b), on, f);
     return on;
 }
 
@@ -155,10 +114,10 @@ static inline Mask from_place(constant const View *view, constant const Scatteri
     UInt4Lanes r = draw(view, f, 1);
     Light l = light_of(params, table, which);
     LightRay ray;
-    Real3 light = lit(params, table, s, &l, world_of(params, f->p), s->d, r, &ray);
+    Real3 light = lit(params, table, &l, world_of(params, f->p), s->d, r, &ray);
     light = scale3(times3(light, f->carried), f->weight * density_at(view, params, voxels, f->p));
-    on &= shines(light);
-    to_light(&ray, light, r.c, on, f);
+    on &= MASK(magnitude(light) > 0.0f);
+    fly_to(f->p, ray.d, ray.length, light, free_depth(r.c), on, f);
     return on;
 }
 
@@ -199,14 +158,14 @@ static inline void collide(constant const Scattering *params, global const float
     Real3 origin = select3(s->place_world, s->entry_world, first), way = minus3(at, origin);
     if (params->discs) {
         Real3 light = met(params, table, origin, f->d, select((Real)(0.0f), s->t_from, first), sqrt(dot3(way, way)), s->density, ~first & MASK(s->density > 0.0f), 1);
-        add_light(s, times3(light, arrives), real);
+        add_light(&s->light, times3(light, arrives), real);
     }
-    add_light(s, real3(arrives.x * params->emission[0], arrives.y * params->emission[1], arrives.z * params->emission[2]), real);
-    Real3 leaves = real3(arrives.x * params->albedo[0], arrives.y * params->albedo[1], arrives.z * params->albedo[2]);
+    add_light(&s->light, by_colour(arrives, params->emission), real);
+    Real3 leaves = by_colour(arrives, params->albedo);
     s->place = select3(s->place, f->p, first);
     s->place_world = select3(s->place_world, at, first);
     s->scattered = select3(s->scattered, leaves, first);
-    s->met |= first & shines(leaves);
+    s->met |= first & MASK(magnitude(leaves) > 0.0f);
 }
 
 // Flights that came to their end: at a light, at a place, or out of the volume.
@@ -214,15 +173,15 @@ static inline void arrive(constant const Scattering *params, global const float 
     Flight *f = &s->flight;
     Real3 arrives = scale3(f->carried, f->weight);
     Mask flown = MASK(s->task > params->lights + 1) & MASK(((s->task - params->lights) & 1) == 0);
-    add_light(s, arrives, over & f->ratio & ~flown);
+    add_light(&s->light, arrives, over & f->ratio & ~flown);
     Mask out = over & ~f->ratio, first = out & MASK(s->task == 0);
     if (!any_lane(out)) return;
     if (params->discs) {
         Real3 origin = select3(s->place_world, s->entry_world, first);
         Real3 light = met(params, table, origin, f->d, select((Real)(0.0f), s->t_from, first), (Real)(1e30f), s->density, ~first & MASK(s->density > 0.0f), 1);
-        add_light(s, times3(light, arrives), out);
+        add_light(&s->light, times3(light, arrives), out);
     }
-    if (params->sky) add_light(s, times3(sky_of(params, f->d), arrives), params->sky_visible ? out : out & ~first);
+    if (params->sky) add_light(&s->light, times3(sky_of(params, f->d), arrives), params->sky_visible ? out : out & ~first);
     if (!(params->sky && params->sky_visible)) s->alpha = select(s->alpha, 1.0f - (arrives.x + arrives.y + arrives.z) * (1.0f / 3.0f), first);
 }
 
@@ -233,16 +192,14 @@ kernel void single_scatter(constant View *view, constant Scattering *params, VOL
     Sample s;
     Flight *f = &s.flight;
     Real zero = (Real)(0.0f);
-    Real3 none = real3(zero, zero, zero);
-    f->p = f->d = f->way = f->inverse = f->carried = s.light = s.entry = s.entry_world = s.d = s.place = s.place_world = s.scattered = none;
-    f->cell.x = f->cell.y = f->cell.z = s.at = s.task = (Int)(0);
-    f->depth = f->left = f->weight = s.alpha = s.length = s.t_from = s.density = zero;
-    f->number = f->event = (UInt)(0u);
-    f->ratio = s.met = (Mask)(0);
+    *f = no_flight(tile.sample);
+    s.light = s.entry = s.entry_world = s.d = s.place = s.place_world = s.scattered = real3(zero, zero, zero);
+    s.at = s.task = (Int)(0);
+    s.alpha = s.length = s.t_from = s.density = zero;
+    s.met = (Mask)(0);
     Mask alive = (Mask)(0);
     int taken = 0;
     uint steps = 0u;
-    f->sample = tile.sample;
     while (f->sample < tile.sample + tile.times) {
         if (taken < ITEM * ITEM && count_lanes(~alive) >= REFILL) {
             Int column, row;
@@ -270,5 +227,5 @@ kernel void single_scatter(constant View *view, constant Scattering *params, VOL
             alive &= ~done;
         }
     }
-    if (tile.times > 0u) tiles[tile.cost_at] = add_sat(tiles[tile.cost_at], steps);
+    cost(tiles, tile, steps);
 }

@@ -16,44 +16,22 @@ typedef struct {
     Real next_depth;
 } Path;
 
-static inline Real magnitude(Real3 c) { return fmax(fabs(c.x), fmax(fabs(c.y), fabs(c.z))); }
-
-static inline void add_light(Path *path, Real3 light, Mask on) {
-    path->light = select3(path->light, add3(path->light, light), on);
-}
-
 // Begins a path in each lane of `fresh`, at the next pixels of the tile.
 static inline void begin(constant const View *view, constant const Scattering *params, Int column, Int row, Mask fresh, Path *path,
                          Mask *done) {
     Flight *f = &path->flight;
-    float2 place = place_in_pixel(f->sample);
-    Real x = to_real(column * view->stride) + place.x, y = to_real(row * view->stride) + place.y;
-    Ray ray = camera_ray(view, x, y);
-    Real3 d = ray_world(view, x, y);
-    Mask meets = MASK(ray.t_far > ray.t_near);
-    Real eye = eye_on_ray(view, x, y), entry = select(eye, ray.t_near, meets);
+    Sight sight = look(view, params, place_in_pixel(f->sample), column, row, fresh, f);
     path->at = select(path->at, row * view->width + column, fresh);
-    f->number = as_UInt(select(as_Int(f->number), row * view->stride * view->full_width + column * view->stride, fresh));
-    f->event = as_UInt(select(as_Int(f->event), (Int)(0), fresh));
-    f->p = select3(f->p, along(ray.origin, ray.direction, entry), fresh);
-    f->d = select3(f->d, d, fresh);
-    f->carried = select3(f->carried, real3((Real)(1.0f), (Real)(1.0f), (Real)(1.0f)), fresh);
-    f->weight = select(f->weight, (Real)(1.0f), fresh);
-    f->left = select(f->left, select((Real)(0.0f), (Real)(1e30f), meets), fresh);
-    f->ratio &= ~fresh;
-    UInt4Lanes r = draw(view, f, 1);
-    f->event += as_UInt(select((Int)(0), (Int)(1), fresh));
-    f->depth = select(f->depth, free_depth(r.a), fresh);
     path->light = select3(path->light, real3((Real)(0.0f), (Real)(0.0f), (Real)(0.0f)), fresh);
     path->alpha = select(path->alpha, (Real)(1.0f), fresh);
     path->scatterings = select(path->scatterings, (Int)(0), fresh);
     path->density = select(path->density, (Real)(0.0f), fresh);
-    path->t_from = select(path->t_from, eye - entry, fresh);
+    path->t_from = select(path->t_from, sight.eye - sight.entry, fresh);
     path->from_world = select3(path->from_world, world_of(params, f->p), fresh);
-    Mask enters = fresh & meets & MASK(ray.t_near > eye);
+    Mask enters = fresh & sight.meets & MASK(sight.entry > sight.eye);
     if (params->index != 1.0f && any_lane(enters)) {
-        Mask back = cross_face(view, 1.0f / params->index, face_at(view, f->p), unit_open(r.b), enters, &f->d);
-        if (params->sky) add_light(path, sky_of(params, f->d), back);
+        Mask back = cross_face(view, 1.0f / params->index, face_at(view, f->p), unit_open(sight.number), enters, &f->d);
+        if (params->sky) add_light(&path->light, sky_of(params, f->d), back);
         f->carried = select3(f->carried, scale3(f->carried, (Real)(1.0f / (params->index * params->index))), enters);
         *done |= back;
     }
@@ -74,7 +52,7 @@ static inline Mask surface_out(constant const View *view, constant const Scatter
 static inline void meet(constant const Scattering *params, global const float *table, Path *path, Real to, Mask on) {
     if (!params->discs) return;
     Real3 light = met(params, table, path->from_world, path->flight.d, path->t_from, to, path->density, params->next_event ? MASK(path->density > 0.0f) : (Mask)(0), 0);
-    add_light(path, scale3(times3(light, path->flight.carried), path->flight.weight), on);
+    add_light(&path->light, scale3(times3(light, path->flight.carried), path->flight.weight), on);
 }
 
 // Paths that scatter: light emitted there, a light aimed at, a direction to go on in. Returns those that have ended.
@@ -84,9 +62,9 @@ static inline Mask scatter(constant const View *view, constant const Scattering 
     Real3 at = world_of(params, f->p), way = minus3(at, path->from_world);
     meet(params, table, path, sqrt(dot3(way, way)), real);
     Real3 arrives = scale3(f->carried, f->weight);
-    add_light(path, real3(arrives.x * params->emission[0], arrives.y * params->emission[1], arrives.z * params->emission[2]), real);
+    add_light(&path->light, by_colour(arrives, params->emission), real);
     path->scatterings += select((Int)(0), (Int)(1), real);
-    Real3 leaves = real3(arrives.x * params->albedo[0], arrives.y * params->albedo[1], arrives.z * params->albedo[2]);
+    Real3 leaves = by_colour(arrives, params->albedo);
     Mask ends = real & (MASK(path->scatterings > params->max_scatterings) | MASK(magnitude(leaves) == 0.0f));
     Mask goes_on = real & ~ends;
     UInt4Lanes s = draw(view, f, 2);
@@ -120,16 +98,9 @@ static inline Mask scatter(constant const View *view, constant const Scattering 
         Real own = l.chance * ray.density, share = select((Real)(1.0f), own / (own + density), MASK(own > 0.0f));
         Real3 light = scale3(times3(leaves, ray.light), density * share / l.chance);
         aims = goes_on & MASK(magnitude(light) > 0.0f);
-        f->carried = select3(f->carried, light, aims);
-        f->d = select3(f->d, ray.d, aims);
-        f->left = select(f->left, ray.length, aims);
-        f->depth = select(f->depth, -log(u), aims);
-        f->ratio |= aims;
+        fly_to(f->p, ray.d, ray.length, light, -log(u), aims, f);
     }
-    Mask straight = goes_on & ~aims;
-    f->carried = select3(f->carried, leaves, straight);
-    f->d = select3(f->d, path->next, straight);
-    f->weight = select(f->weight, (Real)(1.0f), goes_on);
+    fly_on(f->p, path->next, leaves, path->next_depth, goes_on & ~aims, f);
     *elsewhere |= goes_on;
     return ends;
 }
@@ -140,14 +111,8 @@ static inline Mask arrive(constant const View *view, constant const Scattering *
     Flight *f = &path->flight;
     Mask lit = over & f->ratio, out = over & ~f->ratio;
     if (any_lane(lit)) {
-        add_light(path, scale3(f->carried, f->weight), lit);
-        f->p = select3(f->p, path->from, lit);
-        f->d = select3(f->d, path->next, lit);
-        f->carried = select3(f->carried, path->throughput, lit);
-        f->weight = select(f->weight, (Real)(1.0f), lit);
-        f->depth = select(f->depth, path->next_depth, lit);
-        f->left = select(f->left, (Real)(1e30f), lit);
-        f->ratio &= ~lit;
+        add_light(&path->light, scale3(f->carried, f->weight), lit);
+        fly_on(path->from, path->next, path->throughput, path->next_depth, lit, f);
         *elsewhere |= lit;
     }
     if (params->index != 1.0f && any_lane(out & MASK(face >= 0))) {
@@ -159,7 +124,7 @@ static inline Mask arrive(constant const View *view, constant const Scattering *
     meet(params, table, path, (Real)(1e30f), out);
     Mask unscattered = out & MASK(path->scatterings == 0);
     Mask seen = params->sky_visible ? out : out & ~unscattered;
-    if (params->sky) add_light(path, scale3(times3(sky_of(params, f->d), f->carried), f->weight), seen);
+    if (params->sky) add_light(&path->light, scale3(times3(sky_of(params, f->d), f->carried), f->weight), seen);
     Real through = f->weight * (f->carried.x + f->carried.y + f->carried.z) * (1.0f / 3.0f);
     if (!(params->sky && params->sky_visible)) path->alpha = select(path->alpha, 1.0f - through, unscattered);
     return out;
@@ -172,16 +137,13 @@ kernel void volume_path(constant View *view, constant Scattering *params, VOLUME
     Path path;
     Flight *f = &path.flight;
     Real zero = (Real)(0.0f);
-    Real3 none = real3(zero, zero, zero);
-    f->p = f->d = f->way = f->inverse = f->carried = path.light = path.from = path.from_world = path.next = path.throughput = none;
-    f->cell.x = f->cell.y = f->cell.z = path.at = path.scatterings = (Int)(0);
-    f->depth = f->left = f->weight = path.alpha = path.density = path.t_from = path.next_depth = zero;
-    f->number = f->event = (UInt)(0u);
-    f->ratio = (Mask)(0);
+    *f = no_flight(tile.sample);
+    path.light = path.from = path.from_world = path.next = path.throughput = real3(zero, zero, zero);
+    path.at = path.scatterings = (Int)(0);
+    path.alpha = path.density = path.t_from = path.next_depth = zero;
     Mask alive = (Mask)(0);
     int taken = 0;
     uint steps = 0u;
-    f->sample = tile.sample;
     while (f->sample < tile.sample + tile.times) {
         Mask done = (Mask)(0);
         if (taken < ITEM * ITEM && count_lanes(~alive) >= REFILL) {
@@ -212,5 +174,5 @@ kernel void volume_path(constant View *view, constant Scattering *params, VOLUME
             alive &= ~done;
         }
     }
-    if (tile.times > 0u) tiles[tile.cost_at] = add_sat(tiles[tile.cost_at], steps);
+    cost(tiles, tile, steps);
 }

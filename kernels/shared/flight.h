@@ -54,6 +54,22 @@ static inline Real3 world_of(constant const Scattering *params, Real3 p) {
                  mad(m[2], p.x, mad(m[5], p.y, mad(m[8], p.z, (Real)(m[11])))));
 }
 
+static inline Real3 by_colour(Real3 light, constant const float *colour) {
+    return real3(light.x * colour[0], light.y * colour[1], light.z * colour[2]);
+}
+
+static inline Flight no_flight(uint sample) {
+    Flight f;
+    Real zero = (Real)(0.0f);
+    f.p = f.d = f.way = f.inverse = f.carried = real3(zero, zero, zero);
+    f.cell.x = f.cell.y = f.cell.z = (Int)(0);
+    f.depth = f.left = f.weight = zero;
+    f.ratio = (Mask)(0);
+    f.sample = sample;
+    f.number = f.event = (UInt)(0u);
+    return f;
+}
+
 // Points the lanes of `turned` along their d, from their p.
 static inline void aim(constant const View *view, constant const Scattering *params, Mask turned, Flight *f) {
     constant const float *w = view->world_gradient_from_index;
@@ -65,6 +81,46 @@ static inline void aim(constant const View *view, constant const Scattering *par
     f->cell.x = select(f->cell.x, cell_on_axis(f->p.x, 0.0f, params->walls_per_voxel[0], params->walls[0]), turned);
     f->cell.y = select(f->cell.y, cell_on_axis(f->p.y, 0.0f, params->walls_per_voxel[1], params->walls[1]), turned);
     f->cell.z = select(f->cell.z, cell_on_axis(f->p.z, 0.0f, params->walls_per_voxel[2], params->walls[2]), turned);
+}
+
+// Sends the lanes of `on` on from the place p in the direction d, with what they carry: freely, until they collide or leave.
+static inline void fly_on(Real3 p, Real3 d, Real3 carried, Real depth, Mask on, Flight *f) {
+    f->p = select3(f->p, p, on);
+    f->d = select3(f->d, d, on);
+    f->carried = select3(f->carried, carried, on);
+    f->weight = select(f->weight, (Real)(1.0f), on);
+    f->depth = select(f->depth, depth, on);
+    f->left = select(f->left, (Real)(1e30f), on);
+    f->ratio &= ~on;
+}
+
+// The same along a length, to see how much of it arrives.
+static inline void fly_to(Real3 p, Real3 d, Real length, Real3 carried, Real depth, Mask on, Flight *f) {
+    fly_on(p, d, carried, depth, on, f);
+    f->left = select(f->left, length, on);
+    f->ratio |= on;
+}
+
+typedef struct { Mask meets; Real eye, entry, length; UInt number; } Sight; // of the volume from the eye, and a number that is left
+
+// Begins a flight from the eye through a pixel in each lane of `fresh`.
+static inline Sight look(constant const View *view, constant const Scattering *params, float2 place, Int column, Int row, Mask fresh, Flight *f) {
+    Real x = to_real(column * view->stride) + place.x, y = to_real(row * view->stride) + place.y;
+    Ray ray = camera_ray(view, x, y);
+    Sight s;
+    s.meets = MASK(ray.t_far > ray.t_near);
+    s.eye = eye_on_ray(view, x, y);
+    s.entry = select(s.eye, ray.t_near, s.meets);
+    s.length = select((Real)(0.0f), ray.t_far - ray.t_near, s.meets);
+    f->number = as_UInt(select(as_Int(f->number), row * view->stride * view->full_width + column * view->stride, fresh));
+    f->event = as_UInt(select(as_Int(f->event), (Int)(0), fresh));
+    UInt4Lanes r = draw(view, f, 1);
+    f->event += as_UInt(select((Int)(0), (Int)(1), fresh));
+    s.number = r.b;
+    Real one = (Real)(1.0f);
+    fly_on(along(ray.origin, ray.direction, s.entry), ray_world(view, x, y), real3(one, one, one), free_depth(r.a), fresh, f);
+    f->left = select(f->left, (Real)(0.0f), fresh & ~s.meets);
+    return s;
 }
 
 // The density of a raw value; what is not a number is empty.

@@ -12,6 +12,9 @@
 #define LIGHT_QUAD 3
 #define TURN 6.28318531f
 
+static inline Real magnitude(Real3 c) { return fmax(fabs(c.x), fmax(fabs(c.y), fabs(c.z))); }
+static inline void add_light(Real3 *sum, Real3 light, Mask on) { *sum = select3(*sum, add3(*sum, light), on); }
+
 typedef struct { Int kind; Real chance; Real3 colour, place; Real size; Real3 u, v; } Light;
 
 static inline Light light_of(constant const Scattering *params, global const float *table, Int which) {

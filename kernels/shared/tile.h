@@ -1,29 +1,37 @@
-// A work-item renders a tile of ITEM x ITEM pixels, as often as the pass's list says: how many entries, then for each the tile's number,
-// the number of its next sample, and how many it gets; behind room for an entry of every tile, how much each has cost so far, in steps of
-// its packets. A lane whose pixel is through takes the next one of the tile.
+// Pictures are sampled by tiles of TILE x TILE pixels, one a work-item, where a lane whose pixel is through takes the next one of the tile;
+// with one lane a work-item is one of a tile's pixels. `tiles` says which: how many, the number of their next sample, and whether a list
+// follows instead: for each the tile, the number of its next sample, and how many it gets. Behind room for all of them stands what each
+// tile has cost so far, in steps of its packets.
+#define TILE 16
 #if LANES == 1
 #define ITEM 1
+#define ITEMS (TILE * TILE)
 #else
-#define ITEM 16
+#define ITEM TILE
+#define ITEMS 1
 #endif
 // Lanes that are free before more pixels are begun.
 #define REFILL (LANES / 8 + 1)
 
 typedef struct { int left, top; uint sample, times, cost_at; } Tile;
 
-// The tile of the work-item; no times past the end of the list.
-static inline Tile tile_at(constant const View *view, global uint *tiles) {
-    uint number = (uint)view->first_beam + (uint)get_global_id(0);
+// What the work-item renders; no times past the end of the pass.
+static inline Tile tile_at(constant const View *view, global const uint *tiles) {
+    uint number = (uint)view->first_beam + (uint)get_global_id(0), entry = number / ITEMS, part = number % ITEMS;
     Tile t;
     t.left = t.top = 0;
     t.sample = t.times = t.cost_at = 0u;
-    if (number >= tiles[0]) return t;
-    global uint *entry = tiles + 1 + 3 * number;
-    int wide = (view->width + ITEM - 1) / ITEM, high = (view->height + ITEM - 1) / ITEM;
-    t.left = (int)entry[0] % wide * ITEM, t.top = (int)entry[0] / wide * ITEM;
-    t.sample = entry[1], t.times = entry[2];
-    t.cost_at = 1u + 3u * (uint)(wide * high) + entry[0];
+    if (entry >= tiles[0]) return t;
+    global const uint *listed = tiles + 3 + 3 * entry;
+    int wide = (view->width + TILE - 1) / TILE, high = (view->height + TILE - 1) / TILE, tile = (int)(tiles[2] ? listed[0] : entry);
+    t.left = tile % wide * TILE + (int)(part % TILE), t.top = tile / wide * TILE + (int)(part / TILE);
+    t.sample = tiles[2] ? listed[1] : tiles[1], t.times = tiles[2] ? listed[2] : 1u;
+    t.cost_at = 3u + 3u * (uint)(wide * high) + (uint)tile;
     return t;
+}
+
+static inline void cost(global uint *tiles, Tile tile, uint steps) {
+    if (tile.times > 0u) atomic_add(&tiles[tile.cost_at], steps);
 }
 
 // Where in its pixel a sample goes through: the R2 sequence (Roberts 2018), in whole parts of 2^32, from the pixel's centre.

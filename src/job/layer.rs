@@ -3,7 +3,7 @@
 use glam::Vec2;
 
 use super::context::DeviceContext;
-use super::tiling::Tiling;
+use super::tiling::{TILE, Tiling};
 use crate::device::{Buffer, Device};
 use crate::error::Result;
 use crate::film::Samples;
@@ -32,13 +32,12 @@ impl Layer {
     /// [`crate::error::Error::Internal`] when the device has none.
     pub fn new(device: &Device, scene: &Scene, volume: &Volume, stride: usize, stream: u32, step: f32) -> Result<Self> {
         let [width, height] = scene.image().map(|n| (n as usize).div_ceil(stride));
-        let tile = scene.view().tile().map(|side| if device.info().lanes > 1 { side } else { 1 });
-        let tiled = |side: usize| -> Result<_> {
-            let tiling = Tiling::new(side, width, height);
+        let tiled = |_| -> Result<_> {
+            let tiling = Tiling::new(width, height);
             let buffer = device.upload(&vec![0; tiling.room()], 0)?;
             Ok((tiling, buffer))
         };
-        let tiling = tile.map(tiled).transpose()?;
+        let tiling = scene.view().random().map(tiled).transpose()?;
         let table = device.upload(bytemuck::cast_slice(&scene.view().table(volume, step)?), 8)?;
         let buffer = device.allocate(20 * width * height)?;
         Ok(Self { buffer, width, height, stride, samples: 0, table, stream, tiling })
@@ -73,13 +72,16 @@ impl Layer {
         if adaptive && self.tiling.as_ref().is_some_and(|(t, _)| t.is_due(samples)) {
             let read = self.read(context)?;
             if let Some((tiling, buffer)) = &mut self.tiling {
-                let mut costs = vec![0u32; tiling.tiles()];
-                context.device.read(buffer, tiling.costs_at(), &mut costs)?;
-                tiling.plan(samples, &read.deviations(tiling.side()), &costs);
+                if tiling.wants_costs() {
+                    let mut costs = vec![0u32; tiling.tiles()];
+                    context.device.read(buffer, tiling.costs_at(), &mut costs)?;
+                    tiling.learn_costs(&costs);
+                }
+                tiling.plan(samples, &read.deviations(TILE));
             }
         }
         if let Some((tiling, buffer)) = &mut self.tiling {
-            context.device.write(buffer, 0, bytemuck::cast_slice(&tiling.pass()))?;
+            context.device.write(buffer, 0, bytemuck::cast_slice(&tiling.pass(samples)))?;
         }
         Ok(())
     }
@@ -87,8 +89,7 @@ impl Layer {
     /// Work-items of a pass, and about how many rays each has.
     pub fn items(&self, lanes: usize) -> (usize, usize) {
         if let Some((tiling, _)) = &self.tiling {
-            let (entries, samples) = tiling.size_of_pass();
-            return (entries, (samples * tiling.side().pow(2) / entries.max(1)).max(1));
+            return tiling.items(lanes);
         }
         let [beam_w, beam_h] = beam_pixels(lanes);
         (self.width.div_ceil(beam_w) * self.height.div_ceil(beam_h), beam_w * beam_h)

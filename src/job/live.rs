@@ -14,6 +14,7 @@ use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::film::picture::Background;
 use crate::scene::{Scene, Subject};
+use crate::technique::Random;
 use crate::volume::Volume;
 
 /// A turn on the device: long enough to be worth a launch, short enough that nobody waits and a cancel is felt at once.
@@ -227,7 +228,7 @@ impl Live {
     /// variance of the mean itself, so it estimates the picture's standard error.
     fn compare_with_half(&mut self, context: &mut DeviceContext) -> Result<()> {
         let Some(view) = &self.view else { return Ok(()) };
-        if self.scene.as_ref().is_some_and(|s| s.view().least_samples() > 2) {
+        if self.scene.as_ref().is_some_and(|s| s.view().random().is_some()) {
             // Two pictures of one random sample differ by their own noise, whatever the field's.
             return Ok(());
         }
@@ -256,7 +257,7 @@ impl Live {
             return Ok(Verdict::Stop("time"));
         }
         let round = samples.is_power_of_two() || (samples % 3 == 0 && (samples / 3).is_power_of_two());
-        let enough = samples >= scene.view().least_samples();
+        let enough = samples >= if scene.view().random().is_some() { Random::LEAST_SAMPLES } else { 2 };
         let Some(most) = budget.max_error.filter(|_| enough && round) else { return Ok(Verdict::GoOn) };
         let error = Film { field_error: self.field_error, ..view.film(context)? }.error();
         let noise = error.noise.unwrap_or(0.0);

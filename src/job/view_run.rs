@@ -16,7 +16,7 @@ use crate::device::structs::View as DeviceView;
 use crate::error::Result;
 use crate::film::Film;
 use crate::scene::{self, Scene};
-use crate::technique::{CellUse, ViewPlan};
+use crate::technique::{CellUse, Random, ViewPlan};
 use crate::volume::Volume;
 
 /// The shortest step that `max_error` leads to, in voxels: the shortest that a request may ask for.
@@ -56,9 +56,7 @@ pub(super) struct ViewRun {
     /// The longest way through the volume, world units.
     longest: f64,
     least_step: f32,
-    adaptive: bool,
-    noisy: bool,
-    clamp_luminance: f64,
+    random: Option<Random>,
     /// Device time since the start.
     pub device_time: Duration,
 }
@@ -98,9 +96,7 @@ impl ViewRun {
             pass_time: Duration::ZERO,
             longest,
             least_step: (LEAST_STEP_VOXELS * smallest) as f32,
-            adaptive: scene.view().adaptive(),
-            noisy: scene.view().least_samples() > 2,
-            clamp_luminance: scene.view().clamp_luminance(),
+            random: scene.view().random(),
             plan,
             volume: on_device,
             distances,
@@ -234,7 +230,7 @@ impl ViewRun {
     /// Chooses the next pass.
     fn begin(&mut self, context: &DeviceContext) -> Result<Pass> {
         let pass = self.next_pass();
-        let adaptive = self.adaptive && pass == Pass::Main;
+        let adaptive = pass == Pass::Main && self.random.is_some_and(|r| r.adaptive);
         self.layers[index(pass)].choose_tiles(context, adaptive)?;
         if pass == Pass::Main && self.samples() == 0 {
             // What is counted is of the picture, not of its preview.
@@ -271,7 +267,7 @@ impl ViewRun {
             control,
             paired: self.paired(),
             stepless: self.plan.stepless,
-            noisy: self.noisy,
+            noisy: self.random.is_some(),
             opacity_threshold,
             ..Film::default()
         })
@@ -282,7 +278,8 @@ impl ViewRun {
         let mut counts = [0u32; 8];
         context.device.read(&self.counts, 0, &mut counts)?;
         let [non_finite, fireflies, clamped, broken, low, high, cut, _] = counts;
-        let clamped_luminance = (u64::from(high) << 32 | u64::from(low)) as f64 / 65536.0 * self.clamp_luminance;
+        let unit = self.random.and_then(|r| r.clamp_luminance).unwrap_or(0.0) / 65536.0;
+        let clamped_luminance = (u64::from(high) << 32 | u64::from(low)) as f64 * unit;
         Ok(SampleCounts { non_finite, fireflies, clamped, broken, clamped_luminance, cut })
     }
 }

@@ -2,6 +2,7 @@
 
 pub mod emission_absorption;
 pub mod isosurface;
+mod majorant;
 pub mod photon_transport;
 pub mod projection;
 pub mod scattering;
@@ -124,6 +125,20 @@ pub struct ViewPlan {
     pub reasons: Vec<String>,
 }
 
+/// How a view takes samples that are random: by tiles (`kernels/shared/tile.h`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Random {
+    /// Whether more of them are taken where the noise is.
+    pub adaptive: bool,
+    /// The luminance that brighter ones are scaled down to.
+    pub clamp_luminance: Option<f64>,
+}
+
+impl Random {
+    /// Samples per pixel before which the error of random samples is not believed: no render stops for it, and none is placed by it.
+    pub const LEAST_SAMPLES: u32 = 16;
+}
+
 /// A view with valid parameters.
 pub trait View: Send + Sync {
     /// What to run for `volume`.
@@ -149,22 +164,9 @@ pub trait View: Send + Sync {
     fn clips(&self) -> bool {
         true
     }
-    /// Pixels along a side of the square that a work-item renders, where it is not a beam of `kernels/shared/packet.h`; one where the
-    /// device has one lane.
-    fn tile(&self) -> Option<usize> {
+    /// How its samples are taken, where they are random.
+    fn random(&self) -> Option<Random> {
         None
-    }
-    /// Whether samples are put where the noise is; only with tiles.
-    fn adaptive(&self) -> bool {
-        false
-    }
-    /// The luminance that brighter samples are scaled down to; 0 where none are.
-    fn clamp_luminance(&self) -> f64 {
-        0.0
-    }
-    /// Samples per pixel before which a render does not stop for its error: of fewer the error itself is not known.
-    fn least_samples(&self) -> u32 {
-        2
     }
     /// What a reader should know of the parameters on this volume: objects with `code` and `message`.
     fn warnings(&self, _volume: &Volume) -> Vec<Value> {

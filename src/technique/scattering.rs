@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::request;
 pub use device::Scattering;
-pub use parameters::{Majorant, Parameters, Tracking};
+pub(super) use parameters::Parameters;
 pub(super) use plan::{Scatterer, source};
 
 /// The schema of the parameters without those that are not a technique's own, and without phase functions that are not of light.

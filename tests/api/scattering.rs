@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use super::common::with;
 use super::support::*;
 
 fn scene(technique: &str, seed: u64) -> Value {
@@ -104,8 +105,7 @@ async fn mistakes_are_named_where_they_were_made() {
         ("volume_path", json!({"clip": {"planes": [{"normal": [1, 0, 0]}]}}), "/clip"),
         ("emission_absorption", json!({}), "/medium"),
     ] {
-        let mut body = scene(technique, 0);
-        body.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        let body = with(&scene(technique, 0), &more);
         let response = api.post(&body, "application/json").await;
         assert_eq!(response.status(), 422, "{technique} {more}");
         let problem: Value = response.json().await.unwrap();

@@ -11,6 +11,13 @@ use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+/// An object with more fields, or others in their place.
+pub fn with(object: &serde_json::Value, more: &serde_json::Value) -> serde_json::Value {
+    let mut all = object.clone();
+    all.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+    all
+}
+
 /// A `cloudchamber serve` with a data folder of its own; stopped when dropped.
 pub struct Server {
     child: Child,

@@ -4,6 +4,7 @@ use cloudchamber::technique::{Kind, find};
 use serde_json::{Value, json};
 
 use super::common::engine::House;
+pub use super::common::with;
 
 /// The render request of a simulation.
 pub fn request(parameters: &Value) -> Value {
@@ -25,13 +26,6 @@ pub fn fraction(result: &Value, name: &str) -> (f64, f64) {
         entry["value"].as_f64().unwrap_or_else(|| panic!("{name} in {result}")),
         entry["standard_error"].as_f64().unwrap_or(0.0),
     )
-}
-
-/// `parameters` with more of them.
-pub fn with(parameters: &Value, more: &Value) -> Value {
-    let mut all = parameters.clone();
-    all.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
-    all
 }
 
 /// Mean and standard error, from the spread of twenty seeds, of a value of the result.

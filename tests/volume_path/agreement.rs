@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 
 use super::common::engine::House;
 use super::common::light::{agree, channel, film, mean, pixel_z, same_picture, scene, spot, total};
+use super::common::with;
 
 fn lights() -> Value {
     json!([{"type": "sun", "direction": [0.4, 0.8, -0.5], "irradiance": 3}, {"type": "sky", "zenith": 0.6, "horizon": 0.2, "up": [0, 1, 0]}])
@@ -11,13 +12,6 @@ fn lights() -> Value {
 
 fn medium() -> Value {
     json!({"sigma_t_per_unit": 10, "albedo": 0.9, "phase": {"type": "henyey_greenstein", "g": 0.4}})
-}
-
-fn with(mut own: Value, more: &Value) -> Value {
-    for (key, value) in more.as_object().unwrap() {
-        own[key] = value.clone();
-    }
-    own
 }
 
 fn picture(technique: &str, volume: &Value, own: &Value, seed: u64) -> std::sync::Arc<cloudchamber::film::Film> {
@@ -40,11 +34,11 @@ fn every_tracker_makes_the_same_picture() {
         (6, json!({"roulette_threshold": 0})),
         (7, json!({"tracking": "march", "march_step_voxels": 0.02})),
     ] {
-        let other = picture("volume_path", &smoke, &with(base.clone(), &more), seed);
+        let other = picture("volume_path", &smoke, &with(&base, &more), seed);
         same_picture(&reference, &other, &more.to_string());
     }
-    let nearest = picture("volume_path", &smoke, &with(base.clone(), &json!({"interpolation": "nearest"})), 8);
-    let exact = picture("volume_path", &smoke, &with(base, &json!({"tracking": "exact"})), 9);
+    let nearest = picture("volume_path", &smoke, &with(&base, &json!({"interpolation": "nearest"})), 8);
+    let exact = picture("volume_path", &smoke, &with(&base, &json!({"tracking": "exact"})), 9);
     same_picture(&nearest, &exact, "exact");
 }
 
@@ -53,7 +47,7 @@ fn a_long_march_is_seen_to_differ() {
     let smoke = json!({"builtin": "smoke", "resolution": 48});
     let base = json!({"medium": {"sigma_t_per_unit": 40, "albedo": 0.9}, "lights": lights()});
     let reference = picture("volume_path", &smoke, &base, 1);
-    let other = picture("volume_path", &smoke, &with(base, &json!({"tracking": "march", "march_step_voxels": 4})), 2);
+    let other = picture("volume_path", &smoke, &with(&base, &json!({"tracking": "march", "march_step_voxels": 4})), 2);
     let z = pixel_z(&reference, &other);
     let square = z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64;
     assert!(square > 1.5, "a step of 4 voxels goes unseen: mean z² {square}");
@@ -70,8 +64,8 @@ fn one_scattering_is_single_scatter() {
         json!({"medium": {"sigma_t_per_unit": [4, 8, 16], "albedo": [0.9, 0.6, 0.3], "emission": [0.1, 0.2, 0.3]}}),
         json!({"tracking": "exact"}),
     ] {
-        let own = with(json!({"medium": medium(), "lights": lights()}), &more);
-        let path = picture("volume_path", &smoke, &with(own.clone(), &json!({"max_scatterings": 1})), 1);
+        let own = with(&json!({"medium": medium(), "lights": lights()}), &more);
+        let path = picture("volume_path", &smoke, &with(&own, &json!({"max_scatterings": 1})), 1);
         let single = picture("single_scatter", &smoke, &own, 2);
         // A point light among the smoke makes the path's pixels so noisy that their own error is not known well.
         if more["lights"][0]["type"] == "point" {
@@ -106,7 +100,7 @@ fn a_box_is_a_grid_of_one_value() {
     let own = json!({"medium": {"sigma_t_per_unit": 2, "albedo": 0.9}, "lights": lights()});
     let closed = picture("volume_path", &json!({"builtin": "constant", "resolution": 16}), &own, 1);
     same_picture(&closed, &picture("volume_path", &grid, &own, 2), "delta");
-    let exact = with(own, &json!({"tracking": "exact"}));
+    let exact = with(&own, &json!({"tracking": "exact"}));
     same_picture(&closed, &picture("volume_path", &grid, &exact, 3), "exact");
 }
 
@@ -173,7 +167,7 @@ fn lights_one_at_a_time_and_all_in_turn_have_the_same_mean() {
     };
     let single = sum("single_scatter", &own, 100);
     for next_event in [true, false] {
-        let path = sum("volume_path", &with(own.clone(), &json!({"max_scatterings": 1, "next_event": next_event})), 0);
+        let path = sum("volume_path", &with(&own, &json!({"max_scatterings": 1, "next_event": next_event})), 0);
         let z = (path.0 - single.0) / (path.1 + single.1).sqrt();
         println!("next event {next_event}: {} and {}, z {z:.2}", path.0, single.0);
         assert!(z.abs() <= 3.5, "next event {next_event}: {path:?}, {single:?}");

@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 
 use super::common::engine::House;
 use super::common::light::{film, same_picture, scene, total};
+use super::common::with;
 
 fn smoke() -> Value {
     json!({"builtin": "smoke", "resolution": 48})
@@ -14,10 +15,9 @@ fn camera() -> Value {
 }
 
 fn own(more: &Value) -> Value {
-    let mut own = json!({"medium": {"sigma_t_per_unit": 15, "albedo": 0.9}, "lights": [
+    let own = json!({"medium": {"sigma_t_per_unit": 15, "albedo": 0.9}, "lights": [
         {"type": "sun", "direction": [0.4, 0.8, -0.5]}, {"type": "sky", "radiance": 0.2, "visible": false}]});
-    own.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
-    own
+    with(&own, more)
 }
 
 #[test]

@@ -7,6 +7,7 @@ use super::geometry::GridRequest;
 use super::layers::Layer;
 use super::medium::Medium;
 use super::source::LightSource;
+use crate::technique::majorant::Majorant;
 
 /// The parameters in a request.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -97,18 +98,6 @@ pub struct Boundary {
     pub specular_entry: bool,
 }
 
-/// What delta and weighted tracking go by.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct Majorant {
-    /// One for the whole box (`global`), or one for each block of 8³ voxels (`local`).
-    #[schemars(extend("enum" = ["local", "global"]))]
-    pub grid: String,
-    /// Times the greatest extinction. Below 1 delta tracking is biased, and says so.
-    #[schemars(range(min = 1e-3, max = 1e3))]
-    pub scale: f64,
-}
-
 /// Bins for what leaves through the faces at the ends of z.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -165,12 +154,6 @@ impl Default for Parameters {
 impl Default for Boundary {
     fn default() -> Self {
         Self { x: None, y: None, z: None, fresnel: false, outside_index: 1.0, specular_entry: true }
-    }
-}
-
-impl Default for Majorant {
-    fn default() -> Self {
-        Self { grid: "local".into(), scale: 1.0 }
     }
 }
 

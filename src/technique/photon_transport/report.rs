@@ -3,6 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use super::{FIXED_ONE, LEDGER_BINS, Simulation};
+use crate::technique::majorant::march_bias;
 
 /// The ledger's fractions, in the kernel's order.
 const FRACTIONS: [&str; 12] = [
@@ -107,11 +108,10 @@ impl Simulation {
         result
     }
 
-    /// By what part the march's mean free path is too long: h / (1 - exp(-h)) - 1 for a step of optical depth h.
+    /// By what part the march's mean free path is too long where the medium is densest.
     fn march_bias(&self) -> f64 {
         let depth = self.march_step_mm() * self.extinction_range_per_mm[1];
-        let marches = self.tracking == super::tracking::Tracking::March && depth > 0.0;
-        if marches { depth / -(-depth).exp_m1() - 1.0 } else { 0.0 }
+        if self.tracking == super::tracking::Tracking::March { march_bias(depth) } else { 0.0 }
     }
 
     fn broken_words(&self) -> &'static str {

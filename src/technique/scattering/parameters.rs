@@ -7,6 +7,7 @@ use crate::error::{Error, Result};
 use crate::scene::interpolation::Interpolation;
 use crate::scene::lights::LightSource;
 use crate::scene::medium::MediumRequest;
+use crate::technique::majorant::Majorant;
 
 /// How free paths and transmittances are found.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
@@ -23,24 +24,6 @@ pub enum Tracking {
     Delta,
     /// The same with weights, for majorants that may be too small.
     Weighted,
-}
-
-/// The majorants of delta and weighted tracking.
-#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct Majorant {
-    /// `local`: one per macro-cell of 4³ voxels; `global`: one for the volume.
-    #[schemars(extend("enum" = ["local", "global"]))]
-    pub grid: String,
-    /// Times this: below 1 it is broken, above 1 loose.
-    #[schemars(range(min = 0.01, max = 100))]
-    pub scale: f64,
-}
-
-impl Default for Majorant {
-    fn default() -> Self {
-        Self { grid: "local".into(), scale: 1.0 }
-    }
 }
 
 /// The parameters of both views; each leaves out of its schema what is not its own.

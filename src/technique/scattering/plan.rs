@@ -12,7 +12,8 @@ use crate::scene;
 use crate::scene::camera::{Camera, Framing};
 use crate::scene::interpolation::Interpolation;
 use crate::scene::lights::Lights;
-use crate::technique::{CellUse, View, ViewPlan};
+use crate::technique::majorant::march_bias;
+use crate::technique::{CellUse, Random, View, ViewPlan};
 use crate::volume::{Volume, VoxelType};
 
 type Features = [(&'static str, i32); 3];
@@ -264,20 +265,9 @@ impl View for Scatterer {
         false
     }
 
-    fn tile(&self) -> Option<usize> {
-        Some(16)
-    }
-
-    fn adaptive(&self) -> bool {
-        self.parameters.adaptive
-    }
-
-    fn clamp_luminance(&self) -> f64 {
-        self.parameters.clamp_luminance.unwrap_or(0.0)
-    }
-
-    fn least_samples(&self) -> u32 {
-        LEAST_SAMPLES
+    fn random(&self) -> Option<Random> {
+        let p = &self.parameters;
+        Some(Random { adaptive: p.adaptive, clamp_luminance: p.clamp_luminance })
     }
 
     fn warnings(&self, volume: &Volume) -> Vec<Value> {
@@ -298,11 +288,8 @@ impl View for Scatterer {
             let sigma = self.parameters.medium.sigma_t_per_unit(volume).into_iter().fold(0.0, f64::max);
             let h = depth * sigma * self.parameters.medium.greatest_density(volume);
             let message = "the march's free paths are whole steps: where it is densest they are too long by this part";
-            warn("march_bias", message, if h > 0.0 { h / -(-h).exp_m1() - 1.0 } else { 0.0 }, 0.0);
+            warn("march_bias", message, march_bias(h), 0.0);
         }
         warnings
     }
 }
-
-/// A render does not stop for its error before every pixel has so many samples: of fewer the error itself is not known.
-const LEAST_SAMPLES: u32 = 16;
