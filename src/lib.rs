@@ -5,7 +5,7 @@
 //!            (wire JSON) (valid)  (data)  (queue) (OpenCL)  (sums)         (PNG)
 //! ```
 //!
-//! The data goes one way. Who uses whom: `http` and the command line → `job` → `scene` and `technique` → `device` → `film` →
+//! The data goes one way. Who uses whom: `http` and the command line → `study` → `job` → `scene` and `technique` → `device` → `film` →
 //! `frame` → `volume` → `error`; never back (`tests/house.rs` sees to it). A job holds its scene and lets it be planned where it
 //! runs, since a field's plan changes while it fills.
 //!
@@ -20,6 +20,7 @@
 //! | [`technique`] | the list of techniques; one file each, which makes plans as data |
 //! | [`volume`] | grids: readers, built-ins, the store |
 //! | [`job`] | queue, fair slices on the device thread, cancellation, the latest frame |
+//! | [`study`] | speed against accuracy: cases with a truth, measured |
 //! | [`device`] | the only home of OpenCL and of `unsafe`: context, programs, buffers |
 //! | [`chart`] | charts as SVG |
 //! | [`film`] | sums on the host: picture and error |
@@ -39,5 +40,6 @@ pub mod http;
 pub mod job;
 pub mod request;
 pub mod scene;
+pub mod study;
 pub mod technique;
 pub mod volume;

@@ -1,4 +1,4 @@
-//! The command line: `serve`, `render`, `device`, `healthcheck`.
+//! The command line: `serve`, `render`, `study`, `device`, `healthcheck`.
 
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -12,6 +12,7 @@ use cloudchamber::error::{Error, Result};
 use cloudchamber::http::Server;
 use cloudchamber::job::{Engine, State};
 use cloudchamber::scene::Scene;
+use cloudchamber::study;
 use cloudchamber::volume::Store;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
@@ -30,6 +31,8 @@ enum Command {
     Serve(Box<Config>),
     /// Render a scene (the JSON of POST /v1/renders) to a PNG
     Render(Box<RenderArgs>),
+    /// Measure speed against accuracy: every technique against truths that it had no part in
+    Study(Box<StudyArgs>),
     /// Show the OpenCL devices here and the one that would be used
     Device(DeviceArgs),
     /// Exit 0 if the server at the address answers
@@ -62,6 +65,23 @@ struct RenderArgs {
     limits: Limits,
 }
 
+#[derive(clap::Args)]
+struct StudyArgs {
+    /// Only this case
+    #[arg(long)]
+    case: Option<String>,
+    /// Fewer settings and seeds: seconds a case
+    #[arg(long)]
+    quick: bool,
+    /// Where the results go, a JSON a case (default: studies in the data folder)
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    device: DeviceArgs,
+    #[command(flatten)]
+    limits: Limits,
+}
+
 impl RenderArgs {
     fn wants_exr(&self) -> bool {
         self.output.extension().is_some_and(|e| e == "exr")
@@ -87,6 +107,7 @@ fn run(command: Command) -> Result<()> {
     let device = match &command {
         Command::Serve(config) => Some(&config.device),
         Command::Render(args) => Some(&args.device),
+        Command::Study(args) => Some(&args.device),
         Command::Device(device) => Some(device),
         Command::Healthcheck { .. } => None,
     };
@@ -98,6 +119,9 @@ fn run(command: Command) -> Result<()> {
         match command {
             Command::Serve(config) => serve(&config).await,
             Command::Render(args) => render(&args).await,
+            Command::Study(args) => {
+                tokio::task::spawn_blocking(move || run_studies(&args)).await.map_err(Error::internal)?
+            }
             Command::Device(args) => show_devices(&args),
             Command::Healthcheck { listen } => client::healthcheck(&format!("http://{listen}")).await,
         }
@@ -214,6 +238,32 @@ async fn render_here(args: &RenderArgs, scene: &mut Value) -> Result<(Vec<u8>, V
             _ => updates.changed().await.map_err(Error::internal)?,
         }
     }
+}
+
+/// Runs the cases asked for and writes what each came to.
+fn run_studies(args: &StudyArgs) -> Result<()> {
+    let names: Vec<&str> = study::CASES.iter().map(|c| c.name).collect();
+    let asked = |c: &&study::Case| args.case.as_deref().is_none_or(|name| name == c.name);
+    let cases: Vec<&study::Case> = study::CASES.iter().filter(asked).collect();
+    if cases.is_empty() {
+        return Err(Error::internal(format!("there is no such case; there are: {}", names.join(", "))));
+    }
+    let folder = args.output.clone().unwrap_or_else(|| args.device.data_dir().join("studies"));
+    std::fs::create_dir_all(&folder).map_err(|e| Error::internal(format!("{}: {e}", folder.display())))?;
+    let bench = study::bench::Bench::new(&args.device, args.limits.clone())?;
+    let scale = if args.quick { study::Scale::Quick } else { study::Scale::Full };
+    for case in cases {
+        match study::study(&bench, case, scale, &mut |line| eprintln!("{line}"))? {
+            Ok(record) => {
+                let path = folder.join(format!("{}.json", case.name));
+                let text = serde_json::to_string_pretty(&record).map_err(Error::internal)? + "\n";
+                std::fs::write(&path, text).map_err(|e| Error::internal(format!("{}: {e}", path.display())))?;
+                print!("{}", study::table(&record));
+            }
+            Err(why) => println!("{}: left out: {why}", case.name),
+        }
+    }
+    Ok(())
 }
 
 fn show_devices(args: &DeviceArgs) -> Result<()> {

@@ -1,0 +1,193 @@
+//! Runs requests on an engine of this process, and reads numbers from what comes out.
+
+use std::sync::Arc;
+
+use serde_json::{Value, json};
+use tokio::runtime::Handle;
+
+use crate::config::{DeviceArgs, Limits};
+use crate::device::DeviceInfo;
+use crate::error::{Error, Result};
+use crate::film::Film;
+use crate::job::{Engine, Job, State};
+use crate::scene::Scene;
+use crate::volume::{RawQuery, Store};
+
+/// What of a finished render is compared with a truth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Reads {
+    /// The linear luminance of every pixel.
+    Luminance,
+    /// The mean luminance of each block of so many pixels a side.
+    Blocks(usize),
+    /// What gets through every pixel: 1 − alpha.
+    Transmittance,
+    /// Fractions of the launched weight, by their names in the ledger.
+    Ledger(&'static [&'static str]),
+    /// The mean luminance of the picture.
+    Mean,
+}
+
+/// A finished render as the study sees it.
+#[derive(Debug, Clone)]
+pub struct Run {
+    /// What was read.
+    pub values: Vec<f64>,
+    /// Time on the device.
+    pub device_ms: f64,
+    /// Time from asking to the final frame.
+    pub wall_ms: f64,
+    /// Samples per pixel.
+    pub samples: u64,
+    /// Bytes of the film and, where there is one, of the field.
+    pub bytes: u64,
+    /// What the reply says its error is.
+    pub stated_error: Option<f64>,
+    /// The whole reply.
+    pub reply: Value,
+}
+
+impl Run {
+    /// The codes of the reply's warnings.
+    pub fn codes(&self) -> Vec<String> {
+        let warnings = self.reply["warnings"].as_array();
+        warnings.into_iter().flatten().filter_map(|w| Some(w["code"].as_str()?.to_owned())).collect()
+    }
+
+    /// A fraction of the ledger, and its standard error.
+    pub fn fraction(&self, name: &str) -> [f64; 2] {
+        let entry = &self.reply["result"]["ledger"][name];
+        ["value", "standard_error"].map(|part| entry[part].as_f64().unwrap_or(f64::NAN))
+    }
+}
+
+/// An engine and a store of this process.
+pub struct Bench {
+    engine: Engine,
+    store: Store,
+    limits: Limits,
+    handle: Handle,
+    device: Arc<DeviceInfo>,
+}
+
+impl Bench {
+    /// Starts the engine. Must be called on a thread of a tokio runtime that may block.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] when the device or the folder cannot be used.
+    pub fn new(args: &DeviceArgs, limits: Limits) -> Result<Self> {
+        let handle = Handle::current();
+        let store = Store::open(&args.data_dir().join("volumes"), limits.store())?;
+        let engine = Engine::start(args.device_config(), limits.clone())?;
+        let device = handle.block_on(engine.ready())?;
+        Ok(Self { engine, store, limits, handle, device })
+    }
+
+    /// What the device says of itself.
+    pub fn device(&self) -> &DeviceInfo {
+        &self.device
+    }
+
+    /// The volumes.
+    pub fn store(&self) -> &Store {
+        &self.store
+    }
+
+    /// Runs a request to its end.
+    ///
+    /// # Errors
+    /// Those of the request, or [`Error::Internal`] when it fails.
+    pub fn finish(&self, request: &Value) -> Result<Arc<Job>> {
+        let scene = Scene::from_json(request, &self.store, &self.limits)?;
+        let job = self.engine.submit(self.engine.reserve()?, request.clone(), scene);
+        let mut updates = job.watch();
+        let ended = self.handle.block_on(updates.wait_for(|u| u.state.is_terminal()));
+        ended.map_err(Error::internal)?;
+        match job.state() {
+            State::Done => Ok(job),
+            _ => Err(Error::internal(format!("a render of the study failed: {}", job.resource()["failure"]))),
+        }
+    }
+
+    /// Runs a request and reads from it.
+    ///
+    /// # Errors
+    /// As [`Bench::finish`].
+    pub fn run(&self, request: &Value, reads: Reads) -> Result<Run> {
+        let job = self.finish(request)?;
+        let reply = job.resource();
+        let (film, error) = job.film().ok_or_else(|| Error::internal("the film is gone"))?;
+        let number = |at: &str| reply.pointer(at).and_then(Value::as_f64).unwrap_or(0.0);
+        Ok(Run {
+            values: read(&film, &reply, reads),
+            device_ms: number("/timings/device_ms"),
+            wall_ms: number("/timings/elapsed_ms"),
+            samples: u64::from(film.main.count),
+            bytes: film.bytes() as u64 + job.field().map_or(0, |f| f.bytes()),
+            stated_error: Some(error.total),
+            reply,
+        })
+    }
+
+    /// Puts a volume of floats in the store, `value` at the voxels' centres in the box [−½, ½] · `size`, and returns what goes
+    /// under `volume`.
+    ///
+    /// # Errors
+    /// Those of the store.
+    pub fn floats(&self, dims: [usize; 3], size: [f64; 3], value: impl Fn([f64; 3]) -> f64) -> Result<Value> {
+        let centre = |i: usize, a: usize| ((i as f64 + 0.5) / dims[a] as f64 - 0.5) * size[a];
+        let mut bytes = Vec::with_capacity(4 * dims.iter().product::<usize>());
+        for z in 0..dims[2] {
+            for y in 0..dims[1] {
+                for x in 0..dims[0] {
+                    let v = value([centre(x, 0), centre(y, 1), centre(z, 2)]) as f32;
+                    bytes.extend_from_slice(&v.to_le_bytes());
+                }
+            }
+        }
+        let spacing: [f64; 3] = std::array::from_fn(|a| size[a] / dims[a] as f64);
+        let query = RawQuery {
+            dims: Some(dims.map(|n| n.to_string()).join(",")),
+            r#type: Some("f32".into()),
+            spacing: Some(spacing.map(|s| s.to_string()).join(",")),
+            endian: None,
+        };
+        Ok(json!({"id": self.store.insert(bytes, "study", query.parse()?)?.1}))
+    }
+}
+
+fn luminance(p: &[f32]) -> f64 {
+    0.2126 * f64::from(p[0]) + 0.7152 * f64::from(p[1]) + 0.0722 * f64::from(p[2])
+}
+
+fn read(film: &Film, reply: &Value, reads: Reads) -> Vec<f64> {
+    let pixels = || film.main.mean.chunks_exact(4);
+    match reads {
+        Reads::Luminance => pixels().map(luminance).collect(),
+        Reads::Blocks(side) => {
+            let values: Vec<f64> = pixels().map(luminance).collect();
+            block_means(&values, film.size, side)
+        }
+        Reads::Transmittance => pixels().map(|p| 1.0 - f64::from(p[3])).collect(),
+        Reads::Ledger(names) => {
+            let value = |n: &&str| reply["result"]["ledger"][*n]["value"].as_f64().unwrap_or(f64::NAN);
+            names.iter().map(value).collect()
+        }
+        Reads::Mean => {
+            let n = pixels().len().max(1) as f64;
+            vec![pixels().map(luminance).sum::<f64>() / n]
+        }
+    }
+}
+
+/// The means of blocks of `side` pixels a side, row by row.
+pub fn block_means(values: &[f64], [width, height]: [usize; 2], side: usize) -> Vec<f64> {
+    let (wide, high) = (width / side, height / side);
+    let mut sums = vec![0.0; wide * high];
+    for y in 0..high * side {
+        for x in 0..wide * side {
+            sums[y / side * wide + x / side] += values[y * width + x] / (side * side) as f64;
+        }
+    }
+    sums
+}
