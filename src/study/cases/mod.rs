@@ -1,9 +1,13 @@
 //! The cases: one file each, one line here.
 
 mod beer_lambert;
+mod chamber;
+mod cloud;
+mod composite;
 mod ellipsoid;
 mod half_space;
 mod isosurface;
+pub mod scattering;
 mod slab;
 
 use super::Case;
@@ -12,9 +16,15 @@ use super::Case;
 pub const CASES: &[Case] = &[
     beer_lambert::CASE,
     slab::CASE,
+    chamber::CASE,
+    cloud::CASE,
+    scattering::THIN,
+    scattering::MEDIUM,
+    scattering::THICK,
     half_space::CASE,
     isosurface::SPHERE,
     isosurface::MARSCHNER_LOBB,
+    composite::CASE,
     ellipsoid::MEAN,
     ellipsoid::XRAY,
 ];

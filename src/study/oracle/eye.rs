@@ -31,15 +31,17 @@ impl Eye {
         -self.eye.normalize()
     }
 
-    /// The values of `of` (a ray's origin) at the centres of `side` × `side` pixels, and their means over the pixels.
-    pub fn picture(&self, side: usize, of: impl Fn(DVec3) -> f64) -> [Vec<f64>; 2] {
+    /// Where the ray of a place in the picture starts: from 0 to 1, left to right and top to bottom.
+    pub fn origin(&self, x: f64, y: f64) -> DVec3 {
         let forward = self.forward();
         let right = forward.cross(self.up()).normalize();
         let up = right.cross(forward);
-        let at = |x: f64, y: f64| {
-            let place = |v: f64| (v / side as f64 - 0.5) * self.wide;
-            of(self.eye + right * place(x) - up * place(y))
-        };
+        self.eye + right * (x - 0.5) * self.wide - up * (y - 0.5) * self.wide
+    }
+
+    /// The values of `of` (a ray's origin) at the centres of `side` × `side` pixels, and their means over the pixels.
+    pub fn picture(&self, side: usize, of: impl Fn(DVec3) -> f64) -> [Vec<f64>; 2] {
+        let at = |x: f64, y: f64| of(self.origin(x / side as f64, y / side as f64));
         let pixels = || (0..side * side).map(|i| ((i % side) as f64, (i / side) as f64));
         let centres = pixels().map(|(x, y)| at(x + 0.5, y + 0.5)).collect();
         let sub = |i: usize| (i as f64 + 0.5) / SUB_PIXELS as f64;

@@ -1,8 +1,17 @@
 //! References of the host in double precision, written from the definitions and sharing no code with the techniques.
 
 mod eye;
+mod grid;
+mod paths;
+mod slab;
 
 pub use eye::{Eye, inside};
+pub use grid::Grid;
+pub use paths::{Light, Medium, henyey_greenstein};
+pub use slab::{Reflected, reflected};
+
+use glam::DVec3;
+use rayon::prelude::*;
 
 /// SplitMix64 (Steele, Lea, Flood, OOPSLA 2014): nothing in common with the kernels' generator.
 #[derive(Debug, Clone)]
@@ -22,4 +31,43 @@ impl Random {
         z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
         (((z ^ (z >> 31)) >> 11) as f64 + 0.5) / (1u64 << 53) as f64
     }
+
+    /// A unit vector, all alike.
+    pub fn direction(&mut self) -> DVec3 {
+        self.turned(DVec3::Z, 0.0)
+    }
+
+    /// A unit vector whose cosine with `d` is as Henyey and Greenstein say.
+    pub fn turned(&mut self, d: DVec3, g: f64) -> DVec3 {
+        let u = 2.0 * self.unit() - 1.0;
+        let cosine = if g.abs() < 1e-6 { u } else { (1.0 + g * g - ((1.0 - g * g) / (1.0 + g * u)).powi(2)) / (2.0 * g) };
+        let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
+        let (right, up) = d.any_orthonormal_pair();
+        let (sin, cos) = (std::f64::consts::TAU * self.unit()).sin_cos();
+        (d * cosine + (right * cos + up * sin) * sine).normalize()
+    }
+}
+
+/// Means of `count` estimates of several numbers each, and their standard errors, on all cores; the same on any number of them.
+pub fn means<const N: usize>(count: usize, seed: u64, estimate: impl Fn(&mut Random) -> [f64; N] + Sync) -> [[f64; 2]; N] {
+    const CHUNKS: usize = 256;
+    let each = count.div_ceil(CHUNKS);
+    let chunk = |chunk: usize| -> [[f64; 2]; N] {
+        let mut random = Random::new(seed.wrapping_mul(1_000_003).wrapping_add(chunk as u64));
+        let mut sums = [[0.0; 2]; N];
+        for _ in 0..each {
+            for (sum, value) in sums.iter_mut().zip(estimate(&mut random)) {
+                sum[0] += value;
+                sum[1] += value * value;
+            }
+        }
+        sums
+    };
+    let sums: Vec<[[f64; 2]; N]> = (0..CHUNKS).into_par_iter().map(chunk).collect();
+    let n = (each * CHUNKS) as f64;
+    std::array::from_fn(|i| {
+        let total = |part: usize| sums.iter().map(|s| s[i][part]).sum::<f64>() / n;
+        let mean = total(0);
+        [mean, ((total(1) - mean * mean).max(0.0) / n).sqrt()]
+    })
 }
