@@ -21,12 +21,8 @@ pub fn convergence(trace: &[TracePoint], state: &str) -> Result<String> {
 fn draw(svg: &mut String, trace: &[TracePoint], state: &str) -> std::result::Result<(), Box<dyn std::error::Error>> {
     let points: Vec<(f64, f64, bool)> =
         trace.iter().map(|p| (p.elapsed_ms.max(0.1), p.error.max(LEAST_ERROR), p.stride == 1)).collect();
-    let least =
-        |v: &dyn Fn(&(f64, f64, bool)) -> f64, none: f64| points.iter().map(v).reduce(f64::min).unwrap_or(none) / 1.5;
-    let most =
-        |v: &dyn Fn(&(f64, f64, bool)) -> f64, none: f64| points.iter().map(v).reduce(f64::max).unwrap_or(none) * 1.5;
-    let (time, error) = (|p: &(f64, f64, bool)| p.0, |p: &(f64, f64, bool)| p.1);
-    let (x, y) = (least(&time, 1.0)..most(&time, 1000.0), least(&error, 1e-3)..most(&error, 1.0));
+    let x = bounds(points.iter().map(|p| p.0), [1.0, 1000.0], 1.5);
+    let y = bounds(points.iter().map(|p| p.1), [1e-3, 1.0], 1.5);
     let area = SVGBackend::with_string(svg, (640, 400)).into_drawing_area();
     area.fill(&WHITE)?;
     let samples = trace.last().map_or(0, |p| p.samples);
@@ -52,7 +48,14 @@ fn draw(svg: &mut String, trace: &[TracePoint], state: &str) -> std::result::Res
     Ok(())
 }
 
+/// The bounds of values above 0 with some room around them, or `none` where there are no values.
+pub fn bounds(values: impl Iterator<Item = f64> + Clone, none: [f64; 2], room: f64) -> std::ops::Range<f64> {
+    let least = values.clone().reduce(f64::min).unwrap_or(none[0]) / room;
+    let most = values.reduce(f64::max).unwrap_or(none[1]) * room;
+    least..most
+}
+
 /// A number as short as it can be read.
-fn plain(v: f64) -> String {
+pub fn plain(v: f64) -> String {
     if (0.01..1e5).contains(&v) { format!("{}", (v * 1e4).round() / 1e4) } else { format!("{v:.0e}") }
 }

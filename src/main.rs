@@ -13,6 +13,7 @@ use cloudchamber::http::Server;
 use cloudchamber::job::{Engine, State};
 use cloudchamber::scene::Scene;
 use cloudchamber::study;
+use cloudchamber::study::shelf::{STABILITY, Shelf};
 use cloudchamber::volume::Store;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
@@ -240,29 +241,41 @@ async fn render_here(args: &RenderArgs, scene: &mut Value) -> Result<(Vec<u8>, V
     }
 }
 
-/// Runs the cases asked for and writes what each came to.
+/// Runs the cases asked for and puts what each came to on the shelf.
 fn run_studies(args: &StudyArgs) -> Result<()> {
-    let names: Vec<&str> = study::CASES.iter().map(|c| c.name).collect();
-    let asked = |c: &&study::Case| args.case.as_deref().is_none_or(|name| name == c.name);
-    let cases: Vec<&study::Case> = study::CASES.iter().filter(asked).collect();
-    if cases.is_empty() {
+    let asked = |name: &str| args.case.as_deref().is_none_or(|case| case == name);
+    let all_experiments = asked(STABILITY);
+    let experiment = |e: &study::experiments::Experiment| all_experiments || asked(e.name);
+    let cases: Vec<&study::Case> = study::CASES.iter().filter(|c| asked(c.name)).collect();
+    let experiments = study::experiments::EXPERIMENTS;
+    if cases.is_empty() && !experiments.iter().any(experiment) {
+        let names: Vec<&str> =
+            study::CASES.iter().map(|c| c.name).chain([STABILITY]).chain(experiments.iter().map(|e| e.name)).collect();
         return Err(Error::internal(format!("there is no such case; there are: {}", names.join(", "))));
     }
-    let folder = args.output.clone().unwrap_or_else(|| args.device.data_dir().join("studies"));
-    std::fs::create_dir_all(&folder).map_err(|e| Error::internal(format!("{}: {e}", folder.display())))?;
+    let shelf = Shelf::new(args.output.clone().unwrap_or_else(|| args.device.data_dir().join("studies")));
     let bench = study::bench::Bench::new(&args.device, args.limits.clone())?;
     let scale = if args.quick { study::Scale::Quick } else { study::Scale::Full };
+    let mut told = |line: &str| eprintln!("{line}");
     for case in cases {
-        match study::study(&bench, case, scale, &mut |line| eprintln!("{line}"))? {
+        match study::study(&bench, case, scale, &mut told)? {
             Ok(record) => {
-                let path = folder.join(format!("{}.json", case.name));
-                let text = serde_json::to_string_pretty(&record).map_err(Error::internal)? + "\n";
-                std::fs::write(&path, text).map_err(|e| Error::internal(format!("{}: {e}", path.display())))?;
+                shelf.put(&record)?;
                 print!("{}", study::table(&record));
             }
             Err(why) => println!("{}: left out: {why}", case.name),
         }
     }
+    if experiments.iter().any(experiment) {
+        let found = study::stability::stability(&bench, scale, &experiment, &mut told)?;
+        print!("{}", found.page());
+        let silent = found.experiments.iter().find(|e| !e.verdict.is_told()).map(|e| e.name.clone());
+        shelf.put_stability(found)?;
+        if let Some(name) = silent {
+            return Err(Error::internal(format!("{name}: a method is wrong and silent")));
+        }
+    }
+    println!("written to {}", shelf.folder().display());
     Ok(())
 }
 

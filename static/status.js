@@ -83,7 +83,7 @@ export class Status {
 
   #report(resource) {
     byId('warnings').replaceChildren(...(resource.warnings ?? [])
-      .map((warning) => make('li', { textContent: warning.message ?? warning.code ?? String(warning) })));
+      .map((warning) => make('li', { textContent: wordsOf(warning), title: warning.code ?? '' })));
     const parts = Object.entries(resource.error_parts ?? {}).filter(([name, part]) => name !== 'total' && Number.isFinite(part));
     byId('error-parts').replaceChildren(...table('Error, by its causes', parts.map(([name, part]) => [name, percent(part)])));
     const counts = Object.entries(resource.counts ?? {}).filter(([, count]) => Number(count) > 0);
@@ -158,4 +158,11 @@ function flat(value, prefix = '') {
     if (Array.isArray(inner)) return inner.length <= 4 && inner.every((x) => typeof x !== 'object') ? [[path, inner.map((x) => (typeof x === 'number' ? brief(x) : x)).join(', ')]] : [];
     return inner === null ? [] : [[path, inner]];
   });
+}
+
+/** A warning with what was measured and what is permitted, where it says so. */
+function wordsOf(warning) {
+  const number = (value) => (typeof value === 'number' ? Number(value.toPrecision(3)) : JSON.stringify(value));
+  const measured = warning.measured === undefined ? '' : ` (measured ${number(warning.measured)}, bound ${number(warning.bound)})`;
+  return `${warning.message ?? warning.code ?? String(warning)}${measured}`;
 }

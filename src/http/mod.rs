@@ -8,6 +8,7 @@ mod problem;
 mod renders;
 mod routes;
 mod streams;
+mod studies;
 mod viewer;
 mod volumes;
 
@@ -24,6 +25,7 @@ use tokio_util::sync::CancellationToken;
 use crate::config::{Config, Limits};
 use crate::error::{Error, Result};
 use crate::job::Engine;
+use crate::study::shelf::Shelf;
 use crate::volume::Store;
 
 /// Uploads at the same time: each may be as large as the limit of a body.
@@ -38,6 +40,7 @@ const LAST_WORDS: Duration = Duration::from_secs(3);
 pub(crate) struct App {
     engine: Engine,
     store: Arc<Store>,
+    studies: Arc<Shelf>,
     limits: Arc<Limits>,
     request_timeout: Duration,
     streams: Arc<Semaphore>,
@@ -98,6 +101,7 @@ impl Server {
         let app = App {
             engine: engine.clone(),
             store: Arc::new(store),
+            studies: Arc::new(Shelf::new(config.device.data_dir().join("studies"))),
             limits: Arc::new(config.limits.clone()),
             request_timeout: Duration::from_millis(config.request_timeout_ms),
             streams: Arc::new(Semaphore::new(config.limits.max_streams)),

@@ -135,6 +135,18 @@ const OPERATIONS: &[Operation] = &[
         &[404, 409],
     ),
     get(
+        "/v1/studies",
+        "Speed against accuracy: what was measured, and what to choose when",
+        &[(200, JSON, "A list")],
+        &[],
+    ),
+    get(
+        "/v1/studies/{name}",
+        "A study's numbers, or those of `stability`: where methods fail. With .svg after its name, its chart",
+        &[(200, JSON, "The numbers"), (200, "image/svg+xml", "The chart")],
+        &[404],
+    ),
+    get(
         "/v1/techniques",
         "Every technique with the JSON Schema of its parameters and an example",
         &[(200, JSON, "A list")],

@@ -2,6 +2,7 @@
 
 pub mod camera;
 pub mod clip;
+pub mod depth;
 pub mod interpolation;
 pub mod light;
 pub mod lights;

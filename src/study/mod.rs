@@ -8,13 +8,19 @@
 
 pub mod bench;
 pub mod cases;
+pub mod draw;
+pub mod experiments;
 pub mod fit;
 pub mod flip;
 pub mod measure;
 pub mod oracle;
+mod page;
 pub mod record;
 mod run;
+pub mod shelf;
+pub mod stability;
 mod table;
+pub mod verdict;
 
 pub use cases::CASES;
 pub use run::{machine, study};
@@ -52,6 +58,10 @@ pub struct Case {
     pub name: &'static str,
     /// What it is, in a line.
     pub title: &'static str,
+    /// Of whom has a scene like it: "you have …",
+    pub when: &'static str,
+    /// and what to choose then, in plain words.
+    pub choose: &'static str,
     /// Makes its truth and its settings; none where what it needs is not on this machine, with what that is.
     pub trial: fn(&Bench, Scale) -> Result<std::result::Result<Trial, String>>,
 }

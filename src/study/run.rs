@@ -70,7 +70,7 @@ pub fn study(
         }
     }
     for line in &mut lines {
-        let told_apart = |p: &&Point| p.error.rmse > 10.0 * truth.known_to;
+        let told_apart = |p: &&Point| p.error.rmse > 3.0 * truth.known_to;
         let points: Vec<(f64, f64)> = line.points.iter().filter(told_apart).map(|p| (p.at, p.error.rmse)).collect();
         line.slope = fit::slope(&points);
     }

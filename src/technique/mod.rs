@@ -2,12 +2,14 @@
 
 pub mod emission_absorption;
 pub mod isosurface;
-mod majorant;
+pub(crate) mod majorant;
 pub mod photon_transport;
 pub mod projection;
 pub mod scattering;
 pub mod single_scatter;
+pub mod slab;
 pub mod slice;
+mod steps;
 pub mod volume_path;
 
 use std::sync::Arc;

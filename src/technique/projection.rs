@@ -38,6 +38,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
+use super::steps::coarse_step;
 use super::{CellUse, Kind, Technique, View, ViewPlan};
 use crate::device::program::{Source, Variant};
 use crate::device::structs::{DeviceStruct, View as DeviceView};
@@ -256,6 +257,10 @@ impl Parameters {
 }
 
 impl View for Parameters {
+    fn warnings(&self, _: &Volume) -> Vec<Value> {
+        coarse_step(self.step_voxels).filter(|_| !self.walked()).into_iter().collect()
+    }
+
     fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
         let wanted = features(self.interpolation(), self.walked());
         let features = FEATURES.iter().find(|f| **f == wanted).unwrap_or(&FEATURES[0]);

@@ -9,7 +9,13 @@ use crate::study::oracle::{Eye, inside};
 use crate::study::{Case, Scale, Setting, Trial, Truth, view};
 
 /// The case's line.
-pub const CASE: Case = Case { name: "beer_lambert", title: "What gets through a box of one medium", trial };
+pub const CASE: Case = Case {
+    name: "beer_lambert",
+    title: "What gets through a box of one medium",
+    when: "a box of one medium that only absorbs",
+    choose: "`emission_absorption` with the longest step, or an X-ray: both are exact; paths are only noise here",
+    trial,
+};
 
 const SIGMA: f64 = 0.7;
 const SIDE: usize = 64;

@@ -10,7 +10,13 @@ use crate::study::oracle::{Eye, Grid, Light, Medium, means};
 use crate::study::{Case, Scale, Setting, Trial, Truth, view};
 
 /// The case's line.
-pub const CASE: Case = Case { name: "cloud", title: "A cloud under a sun and a sky, by every tracker", trial };
+pub const CASE: Case = Case {
+    name: "cloud",
+    title: "A cloud under a sun and a sky, by every tracker",
+    when: "a cloud, and want a picture",
+    choose: "`volume_path` as it is (delta tracking); `exact` if voxels are meant to have walls",
+    trial,
+};
 
 const SIGMA: f64 = 12.0;
 const ALBEDO: f64 = 0.95;

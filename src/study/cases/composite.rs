@@ -12,8 +12,13 @@ use crate::study::oracle::{Eye, Grid, inside};
 use crate::study::{Case, Scale, Setting, Trial, Truth, view};
 
 /// The case's line.
-pub const CASE: Case =
-    Case { name: "composite", title: "The composite of an MRI head, by step and by what is known of a step", trial };
+pub const CASE: Case = Case {
+    name: "composite",
+    title: "The composite of an MRI head, by step and by what is known of a step",
+    when: "a scan, and want a picture",
+    choose: "`emission_absorption` with a step of two voxels for 1 %, half a voxel for 0.1 %",
+    trial,
+};
 
 const SIDE: usize = 96;
 /// Value, red, green, blue, opacity per mm: skin, brain, and what is bright in between.
@@ -29,7 +34,8 @@ const STEPS_PER_VOXEL: f64 = 64.0;
 
 /// The MRI head of Debian's `mricron-data`, or what CLOUDCHAMBER_TEST_MRI names.
 fn file() -> PathBuf {
-    std::env::var_os("CLOUDCHAMBER_TEST_MRI").map_or_else(|| "/usr/share/mricron/templates/ch2.nii.gz".into(), Into::into)
+    std::env::var_os("CLOUDCHAMBER_TEST_MRI")
+        .map_or_else(|| "/usr/share/mricron/templates/ch2.nii.gz".into(), Into::into)
 }
 
 fn trial(bench: &Bench, scale: Scale) -> Result<std::result::Result<Trial, String>> {

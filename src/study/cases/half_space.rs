@@ -7,7 +7,13 @@ use crate::study::bench::{Bench, Reads};
 use crate::study::{Case, Scale, Setting, Trial, Truth, simulation, view};
 
 /// The case's line.
-pub const CASE: Case = Case { name: "half_space", title: "What a half-space reflects, by photons and by paths", trial };
+pub const CASE: Case = Case {
+    name: "half_space",
+    title: "What a half-space reflects, by photons and by paths",
+    when: "something so thick that nothing comes out behind",
+    choose: "`volume_path` for a few percent, `photon_transport` for less",
+    trial,
+};
 
 const ALBEDO: f64 = 0.9;
 const REFLECTED: f64 = 0.414_947;

@@ -12,12 +12,16 @@ use crate::study::{Case, Scale, Setting, Trial, Truth, view};
 pub const SPHERE: Case = Case {
     name: "isosurface_sphere",
     title: "The lit surface of a sphere, by interpolation and resolution",
+    when: "a smooth surface, sampled well",
+    choose: "trilinear with central differences; more voxels before a better filter",
     trial: sphere,
 };
 /// The test signal's line.
 pub const MARSCHNER_LOBB: Case = Case {
     name: "isosurface_marschner_lobb",
     title: "The lit surface of Marschner and Lobb's test signal, by interpolation and resolution",
+    when: "a surface with detail near the grid's own",
+    choose: "`catmull_rom` with analytic normals: twice the time, a third of the error",
     trial: marschner_lobb,
 };
 

@@ -5,25 +5,32 @@ use serde_json::{Value, json};
 
 use crate::error::Result;
 use crate::study::bench::{Bench, Reads};
-use crate::study::oracle::{Eye, reflected};
+use crate::study::oracle::Eye;
 use crate::study::{Case, Scale, Setting, Trial, Truth, view};
+use crate::technique::slab::reflected;
 
 /// A thin slab's line.
 pub const THIN: Case = Case {
     name: "scattering_thin",
     title: "Light scattered once or often in a slab of optical depth 0.1",
+    when: "a thin haze (optical depth 0.1)",
+    choose: "`single_scatter` if 15 % too dark will do; two scatterings are within 2 %",
     trial: |b, s| trial(b, s, 0.1),
 };
 /// A slab's of a mean free path.
 pub const MEDIUM: Case = Case {
     name: "scattering_medium",
     title: "Light scattered once or often in a slab of optical depth 1",
+    when: "a haze of optical depth 1",
+    choose: "`volume_path`: light scattered once is half of it",
     trial: |b, s| trial(b, s, 1.0),
 };
 /// A thick slab's line.
 pub const THICK: Case = Case {
     name: "scattering_thick",
     title: "Light scattered once or often in a slab of optical depth 10",
+    when: "fog that one cannot see through",
+    choose: "`volume_path` without a limit: even 8 scatterings lack a seventh",
     trial: |b, s| trial(b, s, 10.0),
 };
 
@@ -67,7 +74,7 @@ fn trial(bench: &Bench, scale: Scale, depth: f64) -> Result<std::result::Result<
         words: format!(
             "the radiance back along the beam, by the integral equation of an even slab (Chandrasekhar 1950), at albedo {ALBEDO}"
         ),
-        values: vec![reflected(depth, ALBEDO).radiance],
+        values: vec![reflected(depth, ALBEDO, None, 400).radiance],
         centres: None,
         size: None,
         known_to: 1e-4,

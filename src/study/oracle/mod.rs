@@ -3,12 +3,10 @@
 mod eye;
 mod grid;
 mod paths;
-mod slab;
 
 pub use eye::{Eye, inside};
 pub use grid::Grid;
 pub use paths::{Light, Medium, henyey_greenstein};
-pub use slab::{Reflected, reflected};
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -40,7 +38,8 @@ impl Random {
     /// A unit vector whose cosine with `d` is as Henyey and Greenstein say.
     pub fn turned(&mut self, d: DVec3, g: f64) -> DVec3 {
         let u = 2.0 * self.unit() - 1.0;
-        let cosine = if g.abs() < 1e-6 { u } else { (1.0 + g * g - ((1.0 - g * g) / (1.0 + g * u)).powi(2)) / (2.0 * g) };
+        let cosine =
+            if g.abs() < 1e-6 { u } else { (1.0 + g * g - ((1.0 - g * g) / (1.0 + g * u)).powi(2)) / (2.0 * g) };
         let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
         let (right, up) = d.any_orthonormal_pair();
         let (sin, cos) = (std::f64::consts::TAU * self.unit()).sin_cos();
@@ -49,7 +48,11 @@ impl Random {
 }
 
 /// Means of `count` estimates of several numbers each, and their standard errors, on all cores; the same on any number of them.
-pub fn means<const N: usize>(count: usize, seed: u64, estimate: impl Fn(&mut Random) -> [f64; N] + Sync) -> [[f64; 2]; N] {
+pub fn means<const N: usize>(
+    count: usize,
+    seed: u64,
+    estimate: impl Fn(&mut Random) -> [f64; N] + Sync,
+) -> [[f64; 2]; N] {
     const CHUNKS: usize = 256;
     let each = count.div_ceil(CHUNKS);
     let chunk = |chunk: usize| -> [[f64; 2]; N] {

@@ -1,5 +1,7 @@
 //! What `emission_absorption` has the device run.
 
+use serde_json::Value;
+
 use super::{EmissionAbsorption, Parameters, TECHNIQUE, regions};
 use crate::device::program::{Source, Variant};
 use crate::device::structs::{DeviceStruct, View as DeviceView};
@@ -8,6 +10,7 @@ use crate::scene::camera::Camera;
 use crate::scene::interpolation::Interpolation;
 use crate::scene::presets;
 use crate::scene::transfer::{TABLE_SIZE, TransferFunction};
+use crate::technique::steps::coarse_step;
 use crate::technique::{CellUse, VIEW_HEADERS, View, ViewPlan};
 use crate::volume::{Volume, VoxelType};
 
@@ -105,6 +108,10 @@ impl Parameters {
 }
 
 impl View for Parameters {
+    fn warnings(&self, _: &Volume) -> Vec<Value> {
+        coarse_step(self.step_voxels).into_iter().collect()
+    }
+
     fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
         let skip = self.empty_space_skipping && self.order == "front_to_back";
         let (opaque, named) = match &self.regions {

@@ -11,6 +11,7 @@ use crate::scene;
 use crate::scene::camera::Camera;
 use crate::scene::interpolation::Interpolation;
 use crate::scene::light::LightRequest;
+use crate::technique::steps::coarse_step;
 use crate::technique::{CellUse, View, ViewPlan};
 use crate::volume::{Volume, VoxelType};
 
@@ -163,6 +164,6 @@ impl View for Parameters {
                 format!("no voxel is on the other side of {}: the values go from {low} to {high}", s.isovalue);
             json!({"code": "isovalue_outside_range", "message": message, "measured": s.isovalue, "bound": [low, high]})
         };
-        self.surfaces(volume).iter().filter(outside).map(warning).collect()
+        self.surfaces(volume).iter().filter(outside).map(warning).chain(coarse_step(self.step_voxels)).collect()
     }
 }

@@ -10,9 +10,11 @@ use crate::device::structs::{DeviceStruct, View as DeviceView};
 use crate::error::{Error, Result};
 use crate::scene;
 use crate::scene::camera::{Camera, Framing};
+use crate::scene::depth::greatest_along_axes;
 use crate::scene::interpolation::Interpolation;
 use crate::scene::lights::Lights;
 use crate::technique::majorant::march_bias;
+use crate::technique::slab::missing;
 use crate::technique::{CellUse, Random, View, ViewPlan};
 use crate::volume::{Volume, VoxelType};
 
@@ -75,6 +77,9 @@ pub(in crate::technique) fn source(kernel: &'static str) -> Source {
     }
 }
 
+/// The part of the scattered light that a picture may lack without a word.
+const SCATTERINGS_MISSING: f64 = 0.01;
+
 /// The first is a built-in's.
 fn variants(kernel: &'static str) -> Vec<Variant> {
     let mut types = VoxelType::ALL;
@@ -117,6 +122,16 @@ impl Scatterer {
     /// Whether the density is the same everywhere.
     fn is_box(volume: &Volume) -> bool {
         volume.non_finite() == 0 && volume.range()[0] == volume.range()[1]
+    }
+
+    /// The part of the scattered light that is scattered more often than it is followed: that of a slab as deep as the volume is along
+    /// the axis that it is the least deep along.
+    fn missing(&self, volume: &Volume) -> f64 {
+        let followed = if self.kernel == "single_scatter" { Some(1) } else { self.parameters.max_scatterings };
+        let (Some(followed), medium) = (followed, &self.parameters.medium) else { return 0.0 };
+        let density = greatest_along_axes(volume, |v| medium.density_of(v)).into_iter().fold(f64::INFINITY, f64::min);
+        let (sigma, albedo) = (medium.sigma_t_per_unit(volume), medium.albedo.rgb());
+        (0..3).map(|c| missing(sigma[c] * density, albedo[c], followed)).fold(0.0, f64::max)
     }
 
     fn features(&self, volume: &Volume) -> (&'static Features, String) {
@@ -289,6 +304,11 @@ impl View for Scatterer {
             let h = depth * sigma * self.parameters.medium.greatest_density(volume);
             let message = "the march's free paths are whole steps: where it is densest they are too long by this part";
             warn("march_bias", message, march_bias(h), 0.0);
+        }
+        let missing = self.missing(volume);
+        if missing > SCATTERINGS_MISSING {
+            let message = "this part of what a slab of the same depth would send back is scattered more often than is followed here";
+            warn("multiple_scattering_missing", message, missing, SCATTERINGS_MISSING);
         }
         warnings
     }

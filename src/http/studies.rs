@@ -1,0 +1,67 @@
+//! `/v1/studies`: what was measured, as numbers and as charts.
+
+use axum::Json;
+use axum::extract::State;
+use axum::http::header;
+use axum::response::{IntoResponse, Response};
+use serde_json::{Value, json};
+
+use super::App;
+use super::problem::Id;
+use crate::error::{Error, Result};
+use crate::study::record::Record;
+use crate::study::shelf::{STABILITY, Shelf};
+use crate::study::stability::Stability;
+use crate::study::{CASES, Case};
+
+const ROOT: &str = "/v1/studies";
+
+/// `GET /v1/studies`.
+pub(super) async fn list(State(app): State<App>) -> Result<Json<Value>> {
+    let listed = tokio::task::spawn_blocking(move || {
+        let cases: Vec<Value> = CASES.iter().filter_map(|c| describe(c, &app.studies)).collect();
+        json!({"studies": cases, "stability": app.studies.record(STABILITY).as_ref().map(describe_stability)})
+    });
+    Ok(Json(listed.await.map_err(Error::internal)?))
+}
+
+/// A case in short; none that was not measured.
+fn describe(case: &Case, shelf: &Shelf) -> Option<Value> {
+    let record: Record = shelf.record(case.name)?;
+    Some(json!({
+        "name": record.name, "title": record.title, "when": case.when, "choose": case.choose, "truth": record.truth,
+        "quick": record.quick, "machine": record.machine, "equal_error": record.equal_error, "equal_time": record.equal_time,
+        "href": format!("{ROOT}/{}", record.name), "charts": [format!("{ROOT}/{}.svg", record.name)],
+    }))
+}
+
+fn describe_stability(found: &Stability) -> Value {
+    let experiments = found.experiments.iter().map(|outcome| {
+        let map = outcome.findings.heat_map.as_ref().map(|_| format!("{ROOT}/stability_{}_map.svg", outcome.name));
+        let charts: Vec<String> = [format!("{ROOT}/stability_{}.svg", outcome.name)].into_iter().chain(map).collect();
+        let codes: std::collections::BTreeSet<&String> = outcome.findings.samples().flat_map(|(_, s)| &s.warnings).collect();
+        json!({"name": outcome.name, "title": outcome.title, "expected": outcome.expected, "verdict": outcome.verdict.words(),
+            "warnings": codes, "charts": charts})
+    });
+    json!({"href": format!("{ROOT}/{STABILITY}"), "quick": found.quick, "machine": found.machine,
+        "experiments": experiments.collect::<Vec<_>>(), "not_here_yet": found.not_here_yet})
+}
+
+/// `GET /v1/studies/{name}`: its numbers; `{name}.svg`: its chart.
+pub(super) async fn show(State(app): State<App>, Id(name): Id) -> Result<Response> {
+    let (file, media) = match name.ends_with(".svg") {
+        true => (name.clone(), "image/svg+xml"),
+        false => (format!("{name}.json"), "application/json"),
+    };
+    let found = tokio::task::spawn_blocking(move || app.studies.read(&file)).await.map_err(Error::internal)?;
+    match found {
+        Some(bytes) => {
+            Ok(([(header::CONTENT_TYPE, media), (header::CACHE_CONTROL, "no-cache")], bytes).into_response())
+        }
+        None => {
+            let names: Vec<&str> = CASES.iter().map(|c| c.name).chain([STABILITY]).collect();
+            let name: String = name.chars().take(100).collect();
+            Err(Error::NotFound { what: "study", id: format!("{name} (there are: {})", names.join(", ")) })
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! How much of something a straight line through a volume meets: what decides how much model a scene needs.
+
+use crate::volume::Volume;
+
+/// Lines a side of a face that are looked along.
+const LINES: usize = 32;
+
+/// The greatest integral of `density` (of a value) along lines parallel to each of the volume's own axes, in world units: of up to
+/// `LINES`² lines each, spread evenly over the face. What is not finite counts as empty.
+pub fn greatest_along_axes(volume: &Volume, density: impl Fn(f64) -> f64) -> [f64; 3] {
+    let (dims, spacing) = (volume.dims(), volume.spacing());
+    std::array::from_fn(|axis| {
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        let places = |a: usize| {
+            let lines = dims[a].min(LINES);
+            (0..lines).map(move |i| (2 * i + 1) * dims[a] / (2 * lines))
+        };
+        let along = |at_u: usize, at_v: usize| {
+            let value = |i: usize| {
+                let mut at = [0; 3];
+                (at[axis], at[u], at[v]) = (i, at_u, at_v);
+                Some(volume.value(at[0], at[1], at[2])).filter(|v| v.is_finite()).map_or(0.0, &density)
+            };
+            (0..dims[axis]).map(value).sum::<f64>() * spacing[axis]
+        };
+        places(u).flat_map(|at_u| places(v).map(move |at_v| (at_u, at_v))).map(|(a, b)| along(a, b)).fold(0.0, f64::max)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_constant_is_as_deep_as_it_is_wide() {
+        let volume = crate::volume::builtin::build("constant", 40, 0).expect("a volume");
+        for depth in greatest_along_axes(&volume, |v| 3.0 * v) {
+            assert!((depth - 6.0).abs() < 1e-9, "{depth}: the box is 2 wide");
+        }
+    }
+}

@@ -1,0 +1,33 @@
+//! The study's charts as SVG, drawn by a plotting library.
+
+mod heat;
+mod lines;
+mod sweep;
+
+pub use heat::heat_map;
+pub use lines::study;
+pub use sweep::sweep;
+
+use plotters::style::RGBColor;
+
+/// Colours that are told apart by all eyes (Okabe & Ito, 2008), and dark enough on white.
+const COLORS: [RGBColor; 7] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(86, 180, 233),
+    RGBColor(230, 159, 0),
+    RGBColor(110, 110, 110),
+];
+
+/// The colour of the line of this index.
+fn color(line: usize) -> RGBColor {
+    COLORS[line % COLORS.len()]
+}
+
+/// A relative error in percent.
+fn percent(v: f64) -> String {
+    let v = 100.0 * v;
+    if v >= 1e-3 { format!("{} %", (v * 1e4).round() / 1e4) } else { format!("{v:.0e} %") }
+}

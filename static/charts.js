@@ -1,0 +1,71 @@
+// The Charts page: what was measured, what to choose when, and where methods fail.
+
+import { call, hooks, json, Problem } from './api.js';
+import { showProblem } from './alert.js';
+import { make } from './widgets.js';
+
+const byId = (id) => document.getElementById(id);
+const VERDICTS = { exact: 'told', unbiased: 'told', within: 'told', 'biased and flagged': 'flagged', 'diverges and flagged': 'flagged' };
+
+const row = (cell, ...cells) => make('tr', {}, ...cells.map((content) => make(cell, {}, content)));
+const milliseconds = (ms) => `${Number(ms.toPrecision(3))} ms`;
+
+/** The fastest setting within a bound, in words. */
+const fastest = (choice) => (choice?.setting ? `${choice.setting}: ${milliseconds(choice.device_ms)}` : 'none tried');
+
+/** A chart that is fetched when it comes near: with the token, which an <img> would not send. */
+function chart(href, words, className = '') {
+  const image = make('img', { alt: words, className });
+  const seen = new IntersectionObserver(async ([entry]) => {
+    if (!entry.isIntersecting) return;
+    seen.disconnect();
+    try {
+      image.src = URL.createObjectURL(await (await call(href.slice(1), { accept: 'image/svg+xml' })).blob());
+    } catch (error) {
+      image.alt = `${words}: ${error.message}`;
+    }
+  }, { rootMargin: '600px' });
+  seen.observe(image);
+  return make('figure', {}, image);
+}
+
+function showCases(studies) {
+  byId('choose').replaceChildren(
+    row('th', 'You have', 'Choose', 'Error 10 %', 'Error 1 %', 'Error 0.1 %'),
+    ...studies.map((study) => row('td', make('a', { href: `#${study.name}`, textContent: study.when }), study.choose,
+      ...study.equal_error.map(fastest))),
+  );
+  byId('cases').replaceChildren(...studies.map((study) => make('article', { id: study.name },
+    make('h3', { textContent: study.title }),
+    make('p', { textContent: `Truth: ${study.truth}.${study.quick ? ' The quick form.' : ''}` }),
+    chart(study.charts[0], study.title),
+    make('a', { href: study.href.slice(1), textContent: 'numbers' }))));
+}
+
+function showStability(stability) {
+  const short = (title) => title.split(':')[0];
+  byId('verdicts').replaceChildren(
+    row('th', 'Experiment', 'Expected', 'Verdict', 'Warnings'),
+    ...stability.experiments.map((one) => row('td',
+      make('a', { href: `#experiment-${one.name}`, textContent: short(one.title) }), one.expected,
+      make('span', { textContent: one.verdict, className: VERDICTS[one.verdict] ?? 'silent' }), one.warnings.join(', '))),
+    ...stability.not_here_yet.map(([what, technique]) => row('td', what, '–', `not here yet: ${technique}`, '')),
+  );
+  byId('experiments').replaceChildren(...stability.experiments.map((one) => make('article', { id: `experiment-${one.name}` },
+    make('h3', { textContent: short(one.title) }),
+    one.title === short(one.title) ? null : make('p', { textContent: one.title }),
+    ...one.charts.map((href, i) => chart(href, one.title, i > 0 ? 'map' : '')))));
+}
+
+hooks.askToken = () => Promise.reject(new Problem(401, { title: 'A bearer token is needed: give it in the viewer, in this tab' }));
+
+try {
+  const { studies, stability } = await json('v1/studies');
+  const machine = (studies[0] ?? stability)?.machine;
+  if (machine) byId('device').textContent = `measured on ${machine.processor}, ${machine.threads} threads, ${machine.device}; ${machine.commit}`;
+  showCases(studies);
+  if (stability) showStability(stability);
+  if (location.hash) byId(location.hash.slice(1))?.scrollIntoView();
+} catch (error) {
+  showProblem(error, 'Charts');
+}
