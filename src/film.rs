@@ -50,11 +50,13 @@ fn luminance(p: &[f32]) -> f64 {
 }
 
 impl Samples {
-    fn luminance(&self, pixel: usize) -> f64 {
+    /// Linear luminance of a pixel.
+    pub fn luminance(&self, pixel: usize) -> f64 {
         luminance(&self.mean[4 * pixel..])
     }
 
-    fn pixels(&self) -> usize {
+    /// How many there are.
+    pub fn pixels(&self) -> usize {
         self.width * self.height
     }
 

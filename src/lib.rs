@@ -5,7 +5,7 @@
 //!            (wire JSON) (valid)  (data)  (queue) (OpenCL)  (sums)         (PNG)
 //! ```
 //!
-//! The data goes one way. Who uses whom: `http` and the command line → `study` → `job` → `scene` and `technique` → `device` → `film` →
+//! The data goes one way. Who uses whom: `http` and the command line → `study` → `plan` → `job` → `scene` and `technique` → `device` → `film` →
 //! `frame` → `volume` → `error`; never back (`tests/house.rs` sees to it). A job holds its scene and lets it be planned where it
 //! runs, since a field's plan changes while it fills.
 //!
@@ -20,6 +20,7 @@
 //! | [`technique`] | the list of techniques; one file each, which makes plans as data |
 //! | [`volume`] | grids: readers, built-ins, the store |
 //! | [`job`] | queue, fair slices on the device thread, cancellation, the latest frame |
+//! | [`plan`] | the planner: the cheapest setting that is accurate enough, or the best in a time, with reasons |
 //! | [`study`] | speed against accuracy: cases with a truth, measured |
 //! | [`device`] | the only home of OpenCL and of `unsafe`: context, programs, buffers |
 //! | [`chart`] | charts as SVG |
@@ -38,6 +39,7 @@ pub mod film;
 pub mod frame;
 pub mod http;
 pub mod job;
+pub mod plan;
 pub mod request;
 pub mod scene;
 pub mod study;

@@ -11,9 +11,10 @@ use cloudchamber::device;
 use cloudchamber::error::{Error, Result};
 use cloudchamber::http::Server;
 use cloudchamber::job::{Engine, State};
+use cloudchamber::plan::{Calibrations, Planner};
 use cloudchamber::scene::Scene;
 use cloudchamber::study;
-use cloudchamber::study::shelf::{STABILITY, Shelf};
+use cloudchamber::study::shelf::{PLANNER, STABILITY, Shelf};
 use cloudchamber::volume::Store;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
@@ -213,10 +214,14 @@ async fn render_here(args: &RenderArgs, scene: &mut Value) -> Result<(Vec<u8>, V
         let name = path.file_name().map_or_else(|| "volume".into(), |n| n.to_string_lossy().into_owned());
         scene["volume"] = json!({"id": store.insert(bytes, &name, None)?.1});
     }
-    let valid = Scene::from_json(scene, &store, &args.limits)?;
     let engine = Engine::start(args.device.device_config(), args.limits.clone())?;
     engine.ready().await?;
-    let job = engine.submit(engine.reserve()?, scene.clone(), valid);
+    let calibrations = Calibrations::kept_in(&args.device.data_dir());
+    let planner = Planner { engine: &engine, store: &store, limits: &args.limits, calibrations: &calibrations };
+    let (request, planned) = planner.resolve(scene.take()).await?;
+    let valid = Scene::from_json(&request, &store, &args.limits)?;
+    *scene = request;
+    let job = engine.submit_planned(engine.reserve()?, scene.clone(), valid, planned);
     let bar = bar(scene);
     let mut updates = job.watch();
     loop {
@@ -248,9 +253,13 @@ fn run_studies(args: &StudyArgs) -> Result<()> {
     let experiment = |e: &study::experiments::Experiment| all_experiments || asked(e.name);
     let cases: Vec<&study::Case> = study::CASES.iter().filter(|c| asked(c.name)).collect();
     let experiments = study::experiments::EXPERIMENTS;
-    if cases.is_empty() && !experiments.iter().any(experiment) {
-        let names: Vec<&str> =
-            study::CASES.iter().map(|c| c.name).chain([STABILITY]).chain(experiments.iter().map(|e| e.name)).collect();
+    if cases.is_empty() && !experiments.iter().any(experiment) && !asked(PLANNER) {
+        let names: Vec<&str> = study::CASES
+            .iter()
+            .map(|c| c.name)
+            .chain([STABILITY, PLANNER])
+            .chain(experiments.iter().map(|e| e.name))
+            .collect();
         return Err(Error::internal(format!("there is no such case; there are: {}", names.join(", "))));
     }
     let shelf = Shelf::new(args.output.clone().unwrap_or_else(|| args.device.data_dir().join("studies")));
@@ -274,6 +283,12 @@ fn run_studies(args: &StudyArgs) -> Result<()> {
         if let Some(name) = silent {
             return Err(Error::internal(format!("{name}: a method is wrong and silent")));
         }
+    }
+    if asked(PLANNER) {
+        let found = study::planner::planner(&bench, scale, &mut told)?;
+        let ([met, timed, cheap], n) = (found.figures(), found.scenes.len());
+        println!("of {n} plans {met} meet the error, {timed} the time, {cheap} the cost");
+        shelf.put_planned(&found)?;
     }
     println!("written to {}", shelf.folder().display());
     Ok(())

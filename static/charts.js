@@ -10,6 +10,9 @@ const VERDICTS = { exact: 'told', unbiased: 'told', within: 'told', 'biased and 
 const row = (cell, ...cells) => make('tr', {}, ...cells.map((content) => make(cell, {}, content)));
 const milliseconds = (ms) => `${Number(ms.toPrecision(3))} ms`;
 
+/** Words with `names` set as code. */
+const prose = (text) => make('span', {}, ...text.split('`').map((part, i) => (i % 2 ? make('code', { textContent: part }) : part)));
+
 /** The fastest setting within a bound, in words. */
 const fastest = (choice) => (choice?.setting ? `${choice.setting}: ${milliseconds(choice.device_ms)}` : 'none tried');
 
@@ -32,7 +35,7 @@ function chart(href, words, className = '') {
 function showCases(studies) {
   byId('choose').replaceChildren(
     row('th', 'You have', 'Choose', 'Error 10 %', 'Error 1 %', 'Error 0.1 %'),
-    ...studies.map((study) => row('td', make('a', { href: `#${study.name}`, textContent: study.when }), study.choose,
+    ...studies.map((study) => row('td', make('a', { href: `#${study.name}`, textContent: study.when }), prose(study.choose),
       ...study.equal_error.map(fastest))),
   );
   byId('cases').replaceChildren(...studies.map((study) => make('article', { id: study.name },

@@ -17,6 +17,8 @@ mod openapi;
 mod renders;
 #[path = "api/scattering.rs"]
 mod scattering;
+#[path = "api/studies.rs"]
+mod studies;
 #[path = "api/support.rs"]
 mod support;
 #[path = "api/uploads.rs"]

@@ -188,3 +188,30 @@ async fn a_phone_sees_the_picture_first() {
     assert_eq!(page.js(scrolls).await, json!(false), "the panel is wider than a phone");
     page.close().await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_a_render_warns_of_stands_on_the_picture() {
+    let page = Page::open(DESKTOP).await;
+    page.settled().await;
+    assert_eq!(page.text("#stage #warnings").await, "");
+    page.after("a picture with a long step", page.enter("[data-pointer='/emission_absorption/step_voxels']", "4"))
+        .await;
+    page.until("a warning", "document.querySelector('#stage #warnings').textContent.includes('more than two voxels')")
+        .await;
+    assert!(page.text("#stage #warnings").await.contains("measured 4, bound 2"));
+    page.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_charts_page_shows_what_was_measured() {
+    let page = Page::open(DESKTOP).await;
+    page.settled().await;
+    page.find("header a[href='charts.html']").await.click().await.expect("the link to the charts");
+    page.until("the table of what to choose", "document.querySelectorAll('#choose tr').length > 10").await;
+    page.until("a chart", "[...document.querySelectorAll('#cases img')].some((chart) => chart.naturalWidth > 100)")
+        .await;
+    let verdicts = page.text("#verdicts").await;
+    assert!(verdicts.contains("biased and flagged") && !verdicts.contains("silent"), "{verdicts}");
+    assert_eq!(page.text("#alert").await, "");
+    page.close().await;
+}

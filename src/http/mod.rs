@@ -4,6 +4,7 @@ mod accept;
 mod guard;
 mod info;
 mod openapi;
+mod plans;
 mod problem;
 mod renders;
 mod routes;
@@ -25,6 +26,7 @@ use tokio_util::sync::CancellationToken;
 use crate::config::{Config, Limits};
 use crate::error::{Error, Result};
 use crate::job::Engine;
+use crate::plan::Calibrations;
 use crate::study::shelf::Shelf;
 use crate::volume::Store;
 
@@ -41,6 +43,7 @@ pub(crate) struct App {
     engine: Engine,
     store: Arc<Store>,
     studies: Arc<Shelf>,
+    calibrations: Arc<Calibrations>,
     limits: Arc<Limits>,
     request_timeout: Duration,
     streams: Arc<Semaphore>,
@@ -101,6 +104,7 @@ impl Server {
         let app = App {
             engine: engine.clone(),
             store: Arc::new(store),
+            calibrations: Arc::new(Calibrations::kept_in(&config.device.data_dir())),
             studies: Arc::new(Shelf::new(config.device.data_dir().join("studies"))),
             limits: Arc::new(config.limits.clone()),
             request_timeout: Duration::from_millis(config.request_timeout_ms),

@@ -117,6 +117,18 @@ const OPERATIONS: &[Operation] = &[
         &[(200, "text/event-stream", "Events")],
         &[404, 429],
     ),
+    Operation {
+        method: "post",
+        path: "/v1/plan",
+        words: "What a request would be rendered with for its max_error or time_ms, what that would cost and be wrong by, and why",
+        body: Body::Json("RenderRequest"),
+        answers: &[(
+            200,
+            JSON,
+            "Technique, options, samples, predictions with intervals, reasons, the request to post",
+        )],
+        problems: RENDER,
+    },
     get("/v1/renders/{id}/convergence.svg", "Its error against time", &[(200, "image/svg+xml", "A chart")], &[404]),
     Operation {
         method: "post",
@@ -141,7 +153,7 @@ const OPERATIONS: &[Operation] = &[
         &[],
     ),
     get(
-        "/v1/studies/{name}",
+        "/v1/studies/{id}",
         "A study's numbers, or those of `stability`: where methods fail. With .svg after its name, its chart",
         &[(200, JSON, "The numbers"), (200, "image/svg+xml", "The chart")],
         &[404],

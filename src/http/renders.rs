@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 
 use super::accept::negotiate;
 use super::problem::{self, Id};
-use super::{App, streams};
+use super::{App, plans, streams};
 use crate::error::{Error, Result};
 use crate::frame;
 use crate::job::{Frame, Job, State as JobState};
@@ -61,6 +61,7 @@ async fn submit(app: &App, headers: &HeaderMap, body: Value) -> Result<(Arc<Job>
     {
         return Ok((job, false));
     }
+    let (body, planned) = plans::planner(app).resolve(body).await?;
     // A place in the queue before anything is loaded for the request.
     let place = app.engine.reserve()?;
     // Decoding a volume or making a built-in takes a while: not on the runtime's own threads.
@@ -70,11 +71,11 @@ async fn submit(app: &App, headers: &HeaderMap, body: Value) -> Result<(Arc<Job>
     })
     .await
     .map_err(Error::internal)??;
-    let Some(key) = key else { return Ok((app.engine.submit(place, body, scene), true)) };
+    let Some(key) = key else { return Ok((app.engine.submit_planned(place, body, scene, planned), true)) };
     if let Some(job) = remembered(app, &key)? {
         return Ok((job, false));
     }
-    let job = app.engine.submit(place, body, scene);
+    let job = app.engine.submit_planned(place, body, scene, planned);
     let mut known = app.idempotency.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     known.remember(key, hash, job.id().to_owned());
     Ok((job, true))

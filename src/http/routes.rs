@@ -13,7 +13,7 @@ use tower_http::cors::{AllowOrigin, Any, CorsLayer};
 use tower_http::trace::TraceLayer;
 
 use super::guard::{self, Tokens};
-use super::{App, info, openapi, problem, renders, streams, studies, viewer, volumes};
+use super::{App, info, openapi, plans, problem, renders, streams, studies, viewer, volumes};
 use crate::error::{Error, Result};
 
 /// Every route with its layers.
@@ -31,8 +31,9 @@ pub(super) fn router(app: App, tokens: Tokens, origins: &[String]) -> Result<Rou
         .route("/v1/renders/{id}/convergence.svg", get(renders::convergence))
         .route("/v1/volumes", post(volumes::create).get(volumes::list))
         .route("/v1/volumes/{id}", get(volumes::show).delete(volumes::delete))
+        .route("/v1/plan", post(plans::plan))
         .route("/v1/studies", get(studies::list))
-        .route("/v1/studies/{name}", get(studies::show))
+        .route("/v1/studies/{id}", get(studies::show))
         .route("/v1/techniques", get(info::techniques))
         .route("/v1/device", get(info::device))
         .route("/healthz", get(info::healthz))

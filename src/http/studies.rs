@@ -47,21 +47,14 @@ fn describe_stability(found: &Stability) -> Value {
         "experiments": experiments.collect::<Vec<_>>(), "not_here_yet": found.not_here_yet})
 }
 
-/// `GET /v1/studies/{name}`: its numbers; `{name}.svg`: its chart.
+/// `GET /v1/studies/{id}`: its numbers; `{id}.svg`: its chart.
 pub(super) async fn show(State(app): State<App>, Id(name): Id) -> Result<Response> {
     let (file, media) = match name.ends_with(".svg") {
         true => (name.clone(), "image/svg+xml"),
         false => (format!("{name}.json"), "application/json"),
     };
     let found = tokio::task::spawn_blocking(move || app.studies.read(&file)).await.map_err(Error::internal)?;
-    match found {
-        Some(bytes) => {
-            Ok(([(header::CONTENT_TYPE, media), (header::CACHE_CONTROL, "no-cache")], bytes).into_response())
-        }
-        None => {
-            let names: Vec<&str> = CASES.iter().map(|c| c.name).chain([STABILITY]).collect();
-            let name: String = name.chars().take(100).collect();
-            Err(Error::NotFound { what: "study", id: format!("{name} (there are: {})", names.join(", ")) })
-        }
-    }
+    let missing = || Error::NotFound { what: "study", id: name.chars().take(100).collect() };
+    let headers = [(header::CONTENT_TYPE, media), (header::CACHE_CONTROL, "no-cache")];
+    Ok((headers, found.ok_or_else(missing)?).into_response())
 }

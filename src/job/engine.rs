@@ -151,9 +151,14 @@ impl Engine {
     }
 
     /// Queues a render. `request` is kept to be shown again.
-    pub fn submit(&self, mut place: Place, request: Value, scene: Scene) -> Arc<Job> {
+    pub fn submit(&self, place: Place, request: Value, scene: Scene) -> Arc<Job> {
+        self.submit_planned(place, request, scene, None)
+    }
+
+    /// The same with what the planner said of it.
+    pub fn submit_planned(&self, mut place: Place, request: Value, scene: Scene, planned: Option<Value>) -> Arc<Job> {
         place.taken = true;
-        let job = Job::new(request, scene);
+        let job = Job::new(request, scene, planned);
         self.jobs().by_id.insert(job.id().to_owned(), job.clone());
         self.inner.runtime.spawn(develop::frames(Arc::downgrade(&job), self.clone()));
         self.run(&job);
@@ -202,6 +207,14 @@ impl Engine {
         job.cancel();
     }
 
+    /// Forgets an ended render, or one that nobody waits for.
+    pub fn forget(&self, job: &Arc<Job>) {
+        job.cancel();
+        let mut jobs = self.jobs();
+        jobs.by_id.remove(job.id());
+        jobs.ended.retain(|id| id != job.id());
+    }
+
     /// The render of an id.
     pub fn job(&self, id: &str) -> Option<Arc<Job>> {
         self.jobs().by_id.get(id).cloned()
@@ -221,7 +234,8 @@ impl Engine {
             .increment(1);
         let mut jobs = self.jobs();
         // It may run again by now, or have ended twice.
-        if job.state().is_terminal() && !jobs.ended.iter().any(|id| id == job.id()) {
+        if job.state().is_terminal() && jobs.by_id.contains_key(job.id()) && !jobs.ended.iter().any(|id| id == job.id())
+        {
             jobs.ended.push_back(job.id().to_owned());
         }
         // The newest keeps its film however large, for whoever waits for it.

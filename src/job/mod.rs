@@ -112,6 +112,8 @@ pub(crate) struct Progress {
 pub struct Job {
     id: String,
     request: Value,
+    /// What the planner said of it, where it chose it.
+    planned: Option<Value>,
     created_unix_s: u64,
     cancelled: AtomicBool,
     /// Set while a snapshot is being developed: the device thread skips snapshots that nobody could use.
@@ -122,7 +124,7 @@ pub struct Job {
 }
 
 impl Job {
-    pub(crate) fn new(request: Value, scene: Scene) -> Arc<Self> {
+    pub(crate) fn new(request: Value, scene: Scene, planned: Option<Value>) -> Arc<Self> {
         let progress = Progress {
             state: State::Queued,
             generation: 0,
@@ -147,6 +149,7 @@ impl Job {
         Arc::new(Self {
             id: uuid::Uuid::new_v4().simple().to_string(),
             request,
+            planned,
             created_unix_s: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs()),
             cancelled: AtomicBool::new(false),
             developing: AtomicBool::new(false),

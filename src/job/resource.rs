@@ -25,7 +25,7 @@ impl Job {
             "request": self.request,
             "camera": p.scene.camera().to_json(),
             "image": {"width": p.scene.image()[0], "height": p.scene.image()[1]},
-            "plan": {"technique": p.scene.technique().name, "reasons": p.reasons, "budget": {
+            "plan": {"technique": p.scene.technique().name, "reasons": p.reasons, "planned": self.planned, "budget": {
                 "samples": p.scene.budget().samples, "time_ms": p.scene.budget().time_ms, "max_error": p.scene.budget().max_error}},
             "samples": p.samples,
             "error": p.error.map(|e| e.total),

@@ -119,6 +119,11 @@ impl Camera {
         -self.forward
     }
 
+    /// Height of what the picture shows where the volume's middle is, world units.
+    pub fn height_at_target(&self) -> f64 {
+        2.0 * (self.target - self.eye).length() * (0.5 * self.fov_y_deg.to_radians()).tan()
+    }
+
     /// What the device is told for an image of `size` pixels of a volume: the plane near the volume and its pixels, worked out
     /// in double precision so that a far eye costs no digits. The fields of the pass are left at zero.
     pub fn device_view(&self, size: [u32; 2], volume: &Volume) -> View {

@@ -26,6 +26,8 @@ use crate::volume::{Store, Volume};
 use camera::{Camera, Framing};
 use clip::Clip;
 
+/// The technique of a request that leaves it to the planner.
+pub const AUTO: &str = "auto";
 /// Pixels a side when the request is silent.
 const DEFAULT_SIDE: u32 = 512;
 /// Samples when the budget is silent: enough that the jitter's noise is below a grey level in most pictures.
@@ -91,7 +93,7 @@ pub fn parameters_schema(technique: &Technique, limits: &Limits) -> Value {
 pub fn schema(limits: &Limits) -> Value {
     let mut schema = request::schema_of::<RenderRequest>();
     let names: Vec<&str> = technique::views().map(|t| t.name).collect();
-    schema["properties"]["technique"]["enum"] = names.into();
+    schema["properties"]["technique"]["enum"] = names.into_iter().chain([AUTO]).collect();
     for t in technique::views() {
         schema["properties"][t.name] = parameters_schema(t, limits);
     }
@@ -123,6 +125,10 @@ impl Scene {
             return Err(Error::invalid("", "not an object", "a JSON object with at least technique"));
         }
         let request: RenderRequest = request::parse(body, &schema(limits), "")?;
+        if request.technique == AUTO {
+            let permitted = "a technique's name; POST /v1/renders and /v1/plan resolve it";
+            return Err(Error::invalid("/technique", "this has to be planned first", permitted));
+        }
         let technique = technique::find(&request.technique)
             .ok_or_else(|| Error::internal("the schema permits a technique that is not in the list"))?;
         let technique::Kind::View(parse) = technique.kind else {

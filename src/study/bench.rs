@@ -10,6 +10,7 @@ use crate::device::DeviceInfo;
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::job::{Engine, Job, State};
+use crate::plan::{Calibrations, Plan, Planner};
 use crate::scene::Scene;
 use crate::volume::{RawQuery, Store};
 
@@ -68,6 +69,7 @@ pub struct Bench {
     limits: Limits,
     handle: Handle,
     device: Arc<DeviceInfo>,
+    calibrations: Calibrations,
 }
 
 impl Bench {
@@ -80,7 +82,8 @@ impl Bench {
         let store = Store::open(&args.data_dir().join("volumes"), limits.store())?;
         let engine = Engine::start(args.device_config(), limits.clone())?;
         let device = handle.block_on(engine.ready())?;
-        Ok(Self { engine, store, limits, handle, device })
+        let calibrations = Calibrations::kept_in(&args.data_dir());
+        Ok(Self { engine, store, limits, handle, device, calibrations })
     }
 
     /// What the device says of itself.
@@ -107,6 +110,26 @@ impl Bench {
             State::Done => Ok(job),
             _ => Err(Error::internal(format!("a render of the study failed: {}", job.resource()["failure"]))),
         }
+    }
+
+    fn planner(&self) -> Planner<'_> {
+        Planner { engine: &self.engine, store: &self.store, limits: &self.limits, calibrations: &self.calibrations }
+    }
+
+    /// Plans a request.
+    ///
+    /// # Errors
+    /// Those of the planner.
+    pub fn plan(&self, request: &Value) -> Result<Plan> {
+        self.handle.block_on(self.planner().plan(request))
+    }
+
+    /// Every setting that the planner could have chosen for a request, in words and as a request; the first is the reference.
+    ///
+    /// # Errors
+    /// Those of the request.
+    pub fn settings(&self, request: &Value) -> Result<Vec<(String, Value)>> {
+        self.planner().settings(request)
     }
 
     /// Runs a request and reads from it.

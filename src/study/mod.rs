@@ -15,6 +15,7 @@ pub mod flip;
 pub mod measure;
 pub mod oracle;
 mod page;
+pub mod planner;
 pub mod record;
 mod run;
 pub mod shelf;

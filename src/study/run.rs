@@ -7,6 +7,7 @@ use serde_json::json;
 use super::bench::{Bench, Reads, Run};
 use super::record::{Choice, Line, Machine, Point, Record};
 use super::{Case, Scale, Setting, Trial, Truth, fit, flip, measure};
+use crate::chart::plain;
 use crate::error::Result;
 
 /// The errors of the table of the fastest settings.
@@ -80,8 +81,10 @@ pub fn study(
 fn finish(bench: &Bench, case: &Case, scale: Scale, truth: Truth, mut lines: Vec<Line>) -> Record {
     let all: Vec<(f64, f64)> = lines.iter().flat_map(|l| &l.points).map(|p| (p.device_ms, p.error.rmse)).collect();
     let front = fit::pareto(&all);
-    let names: Vec<String> =
-        lines.iter().flat_map(|l| l.points.iter().map(move |p| format!("{}, {} {}", l.name, l.of, p.at))).collect();
+    let names: Vec<String> = lines
+        .iter()
+        .flat_map(|l| l.points.iter().map(move |p| format!("{}, {} {}", l.name, l.of, plain(p.at))))
+        .collect();
     for (point, front) in lines.iter_mut().flat_map(|l| &mut l.points).zip(front) {
         point.front = front;
     }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use include_dir::{Dir, include_dir};
 use serde::de::DeserializeOwned;
 
+use super::planner::Planned;
 use super::record::Record;
 use super::stability::Stability;
 use super::{draw, page};
@@ -16,6 +17,9 @@ static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/docs/charts");
 
 /// The name of the experiments' study.
 pub const STABILITY: &str = "stability";
+
+/// The name of the planner's study.
+pub const PLANNER: &str = "planner";
 
 /// A folder of studies.
 #[derive(Debug, Clone)]
@@ -92,6 +96,15 @@ impl Shelf {
             }
         }
         Ok(())
+    }
+
+    /// Puts the planner's figures and their page in the folder.
+    ///
+    /// # Errors
+    /// As [`Shelf::put`].
+    pub fn put_planned(&self, found: &Planned) -> Result<()> {
+        self.write("planner.json", &json(found)?)?;
+        self.write("planner.md", &found.page())
     }
 
     fn write(&self, file: &str, text: &str) -> Result<()> {

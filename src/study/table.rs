@@ -1,6 +1,7 @@
 //! A study in Markdown.
 
 use super::record::Record;
+use crate::chart::plain;
 
 fn percent(v: f64) -> String {
     format!("{:.3} %", 100.0 * v)
@@ -24,7 +25,7 @@ pub fn table(record: &Record) -> String {
                 "| {}, {} {} | {:.3} ms | {} | {bias} | {} | {} | {} |\n",
                 line.name,
                 line.of,
-                point.at,
+                plain(point.at),
                 point.device_ms,
                 percent(point.error.rmse),
                 point.error.noise.map_or("–".into(), percent),

@@ -8,18 +8,18 @@ use serde_json::{Value, json};
 use super::common::{Server, kernel_cache, mri_head};
 use super::support::*;
 
-fn cloudchamber(data: &Path, arguments: &[&str]) -> Output {
+pub fn cloudchamber(data: &Path, arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_cloudchamber"));
     command.args(arguments).env("POCL_CACHE_DIR", kernel_cache()).env("CLOUDCHAMBER_DATA_DIR", data);
     command.output().unwrap()
 }
 
-fn succeeds(output: &Output) -> String {
+pub fn succeeds(output: &Output) -> String {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout.clone()).unwrap()
 }
 
-fn fails(output: &Output, words: &str) {
+pub fn fails(output: &Output, words: &str) {
     assert!(!output.status.success());
     let told = String::from_utf8_lossy(&output.stderr);
     assert!(told.contains(words), "'{words}' is not in: {told}");

@@ -21,7 +21,7 @@ pub const MARSCHNER_LOBB: Case = Case {
     name: "isosurface_marschner_lobb",
     title: "The lit surface of Marschner and Lobb's test signal, by interpolation and resolution",
     when: "a surface with detail near the grid's own",
-    choose: "`catmull_rom` with analytic normals: twice the time, a third of the error",
+    choose: "more voxels with trilinear first; where there are no more, `catmull_rom` with analytic normals has a third of its error for several times its time",
     trial: marschner_lobb,
 };
 

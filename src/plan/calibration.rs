@@ -1,0 +1,97 @@
+//! What is known of this device: by how much a sample is cheaper or dearer in a large picture than in a pilot. Measured once, in less
+//! than three seconds, and kept in the data folder.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use tokio::sync::OnceCell;
+
+use super::{Planner, pilot};
+use crate::error::Result;
+
+/// Techniques that are calibrated: one a family.
+const TECHNIQUES: [&str; 3] = ["emission_absorption", "volume_path", "isosurface"];
+/// Side of the large picture, and samples of it and of the pilot.
+const LARGE: u32 = 384;
+const SAMPLES: [u32; 2] = [2, 16];
+/// Pixels of the pilot and of the large picture, between which is interpolated.
+const PIXELS: [f64; 2] = [4096.0, (LARGE * LARGE) as f64];
+
+/// Factors of a device.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Calibration {
+    /// The device with its driver, and this program's version: another is calibrated anew.
+    of: String,
+    /// By technique: the time of a sample in the large picture over that in the pilot.
+    large_over_pilot: BTreeMap<String, f64>,
+}
+
+impl Calibration {
+    /// What the time of a sample in a pilot is multiplied by, for a picture of so many pixels.
+    pub fn factor(&self, technique: &str, pixels: f64) -> f64 {
+        let known = |name: &str| self.large_over_pilot.get(name).copied();
+        let large = known(technique).or_else(|| known("emission_absorption")).unwrap_or(1.0);
+        let part = (pixels / PIXELS[0]).ln() / (PIXELS[1] / PIXELS[0]).ln();
+        large.powf(part.clamp(0.0, 1.0))
+    }
+}
+
+/// The calibration, once it is needed: a server that plans nothing spends nothing on it.
+#[derive(Debug)]
+pub struct Calibrations {
+    file: PathBuf,
+    known: OnceCell<Calibration>,
+}
+
+impl Calibrations {
+    /// Kept in this folder.
+    pub fn kept_in(folder: &std::path::Path) -> Self {
+        Self { file: folder.join("calibration.json"), known: OnceCell::new() }
+    }
+
+    /// The device's, from the file or measured now.
+    ///
+    /// # Errors
+    /// When a render fails.
+    pub(super) async fn of(&self, planner: &Planner<'_>) -> Result<Calibration> {
+        self.known.get_or_try_init(|| self.read_or_measure(planner)).await.cloned()
+    }
+
+    async fn read_or_measure(&self, planner: &Planner<'_>) -> Result<Calibration> {
+        let info = planner.engine.ready().await?;
+        let of = format!("{}, {}, {} lanes, {}", info.device, info.driver, info.lanes, env!("CARGO_PKG_VERSION"));
+        let kept = std::fs::read(&self.file).ok().and_then(|bytes| serde_json::from_slice::<Calibration>(&bytes).ok());
+        if let Some(kept) = kept.filter(|k| k.of == of) {
+            return Ok(kept);
+        }
+        let mut large_over_pilot = BTreeMap::new();
+        for technique in TECHNIQUES {
+            large_over_pilot.insert(technique.to_owned(), ratio(planner, technique).await?);
+        }
+        let found = Calibration { of, large_over_pilot };
+        // What cannot be kept is measured again next time.
+        if let Err(error) = serde_json::to_vec_pretty(&found).map(|text| std::fs::write(&self.file, text)) {
+            tracing::warn!(%error, "the calibration is not kept");
+        }
+        Ok(found)
+    }
+}
+
+/// The time of a sample in a large picture over that in a pilot, of the built-in smoke.
+async fn ratio(planner: &Planner<'_>, technique: &str) -> Result<f64> {
+    let time = async |side: u32, samples: u32| -> Result<f64> {
+        let mut least = f64::INFINITY;
+        for seed in 0..3 {
+            let request = json!({"technique": technique, "volume": {"builtin": "smoke", "resolution": 64}, "seed": seed,
+                "image": {"width": side, "height": side}, "budget": {"samples": samples}});
+            let (_, _, device_ms) = pilot::finish(planner, request).await?;
+            least = least.min(device_ms / (f64::from(samples) * f64::from(side).powi(2)));
+        }
+        Ok(least)
+    };
+    let small = time(PIXELS[0].sqrt() as u32, SAMPLES[1]).await?;
+    let large = time(LARGE, SAMPLES[0]).await?;
+    Ok(if small > 0.0 { (large / small).clamp(0.1, 10.0) } else { 1.0 })
+}

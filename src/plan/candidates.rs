@@ -1,0 +1,168 @@
+//! The settings that could do.
+
+use serde_json::{Map, Value, json};
+
+use super::Considered;
+use super::features::Features;
+use crate::scene::AUTO;
+use crate::technique;
+
+/// Steps that are tried, sides of the smallest voxel.
+const STEPS: [f64; 4] = [2.0, 1.0, 0.5, 0.25];
+/// Scatterings that are tried before all of them.
+const SCATTERINGS: [u32; 4] = [1, 2, 4, 8];
+/// A bound that is off by as much rules a setting out: it is of a slab, and the scene is not one.
+const SLACK: f64 = 3.0;
+
+/// Whether a request leaves the technique to the planner.
+pub fn is_auto(body: &Value) -> bool {
+    body["technique"] == AUTO
+}
+
+/// Settings of which one stands for the truth of the others.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Family {
+    /// Views that sample along a ray: the truth is a short step.
+    Stepping(&'static str),
+    /// Views that scatter light: the truth is all of its paths.
+    Scattering,
+}
+
+impl Family {
+    /// The family that a request is of: its technique's, or that of what it says of the scene.
+    pub fn of(body: &Value) -> Self {
+        let named = |name: &str| match name {
+            "volume_path" | "single_scatter" => Some(Self::Scattering),
+            name => technique::views().find(|t| t.name == name).map(|t| Self::Stepping(t.name)),
+        };
+        let given = || technique::views().find(|t| body.get(t.name).is_some()).and_then(|t| named(t.name));
+        let scatters = body.get("medium").is_some() || body.get("lights").is_some();
+        let named = body["technique"].as_str().and_then(named);
+        named
+            .or_else(|| scatters.then_some(Self::Scattering))
+            .or_else(given)
+            .unwrap_or(Self::Stepping("emission_absorption"))
+    }
+
+    /// The technique that a request of the family is checked as.
+    pub fn technique(self) -> &'static str {
+        match self {
+            Self::Stepping(name) => name,
+            Self::Scattering => "volume_path",
+        }
+    }
+}
+
+/// A technique with its own parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// The technique.
+    pub technique: String,
+    /// Its own parameters.
+    pub own: Value,
+    /// What it is, in words.
+    pub words: String,
+    /// Whether more samples take all of its error away.
+    pub unbiased: bool,
+}
+
+impl Candidate {
+    /// The request with this setting in it.
+    pub fn request(&self, body: &Value) -> Value {
+        let mut request = with_technique(body, &self.technique);
+        for technique in technique::views() {
+            if let Some(object) = request.as_object_mut() {
+                object.remove(technique.name);
+            }
+        }
+        request[self.technique.as_str()] = self.own.clone();
+        request
+    }
+}
+
+/// The body with another technique.
+pub fn with_technique(body: &Value, technique: &str) -> Value {
+    let mut request = body.clone();
+    request["technique"] = json!(technique);
+    request
+}
+
+/// The candidates, the first of which is the reference, and those that a bound rules out.
+pub fn candidates(body: &Value, family: Family, features: &Features, error: f64) -> (Vec<Candidate>, Vec<Considered>) {
+    match family {
+        Family::Stepping(name) => (stepping(body, name), Vec::new()),
+        Family::Scattering => scattering(body, features, error),
+    }
+}
+
+fn given(body: &Value, technique: &str) -> Map<String, Value> {
+    body.get(technique).and_then(Value::as_object).cloned().unwrap_or_default()
+}
+
+fn stepping(body: &Value, name: &str) -> Vec<Candidate> {
+    let own = given(body, name);
+    let schema = technique::find(name).map(|t| (t.schema)()).unwrap_or_default();
+    let open = |field: &str| schema["properties"].get(field).is_some() && !own.contains_key(field);
+    let of = |more: &[(&str, Value)], words: String, unbiased: bool| {
+        let mut own = own.clone();
+        own.extend(more.iter().map(|(k, v)| ((*k).to_owned(), v.clone())));
+        Candidate { technique: name.into(), own: Value::Object(own), words, unbiased }
+    };
+    if !open("step_voxels") {
+        return vec![of(&[], format!("{name} as it is given"), true)];
+    }
+    let ways: &[bool] = if open("pre_integrated") { &[false, true] } else { &[false] };
+    let mut all = Vec::new();
+    for way in ways {
+        for step in STEPS {
+            let mut more = vec![("step_voxels", json!(step))];
+            let mut words = format!("{name}, step of {step} voxels");
+            if *way {
+                more.push(("pre_integrated", json!(true)));
+                words += ", pre-integrated";
+            }
+            all.push(of(&more, words, false));
+        }
+    }
+    let reference =
+        of(&[("step_voxels", json!(STEPS[STEPS.len() - 1] / 2.0))], format!("{name}, the shortest step"), true);
+    all.insert(0, reference);
+    all
+}
+
+fn scattering(body: &Value, features: &Features, error: f64) -> (Vec<Candidate>, Vec<Considered>) {
+    let mut own = given(body, "volume_path");
+    own.extend(given(body, "single_scatter"));
+    let of = |technique: &str, more: &[(&str, Value)], words: String, unbiased: bool| {
+        let mut own = own.clone();
+        own.extend(more.iter().map(|(k, v)| ((*k).to_owned(), v.clone())));
+        Candidate { technique: technique.into(), own: Value::Object(own), words, unbiased }
+    };
+    let mut all = vec![of("volume_path", &[], "volume_path, every scattering".into(), true)];
+    let mut ruled_out = Vec::new();
+    let free = super::is_auto(body) && !own.contains_key("max_scatterings") && features.albedo != Some(0.0);
+    for scatterings in SCATTERINGS.into_iter().filter(|_| free) {
+        let bound = features.missing(scatterings);
+        let (technique, words) = match scatterings {
+            1 => ("single_scatter", "single_scatter".to_owned()),
+            n => ("volume_path", format!("volume_path, at most {n} scatterings")),
+        };
+        if bound > SLACK * error {
+            ruled_out.push(Considered {
+                why: format!("a slab as deep as this would lack {:.1} % of what it sends back", 100.0 * bound),
+                words,
+                technique: technique.into(),
+                samples: None,
+                device_ms: None,
+                error: None,
+                bias: Some(bound),
+                enough: false,
+            });
+            continue;
+        }
+        let limit = [("max_scatterings", json!(scatterings))];
+        let more = if scatterings == 1 { &[][..] } else { &limit[..] };
+        all.push(of(technique, more, words, false));
+    }
+    (all, ruled_out)
+}

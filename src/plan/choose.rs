@@ -1,0 +1,195 @@
+//! The cheapest candidate that is enough, or the best that is in time.
+
+use super::calibration::Calibration;
+use super::pilot::Pilot;
+use super::{Considered, Predicted, Wish};
+
+/// What a plan aims at, of the error asked for: estimates are off by a few percent.
+pub(super) const AIM: f64 = 0.94;
+/// About nine of ten device times are within this factor of the predicted one.
+const TIME_FACTOR: f64 = 1.5;
+/// And errors.
+const ERROR_FACTOR: f64 = 1.25;
+
+/// What was chosen.
+pub struct Chosen {
+    /// The pilot's index.
+    pub index: usize,
+    /// Samples per pixel.
+    pub samples: u32,
+    /// Whether it is enough for the error asked for.
+    pub enough: bool,
+    /// Predicted.
+    pub device_ms: Predicted,
+    /// Predicted.
+    pub error: Predicted,
+    /// Why.
+    pub reasons: Vec<String>,
+    /// All of them, in the order of the pilots.
+    pub considered: Vec<Considered>,
+}
+
+impl Pilot {
+    /// Whether its errors are those of random paths, which were seen at one number of samples.
+    pub fn is_random(&self) -> bool {
+        self.noise.len() == 1
+    }
+
+    /// The noise after `samples`: along the curve that was looked at, and beyond it as the root of the samples.
+    pub fn noise_after(&self, samples: f64) -> f64 {
+        let Some((last, error)) = self.noise.last() else { return 0.0 };
+        let beyond = error * (f64::from(*last) / samples).sqrt();
+        if samples >= f64::from(*last) || self.noise.len() < 2 {
+            return beyond;
+        }
+        let at = self.noise.iter().position(|(n, _)| f64::from(*n) >= samples).unwrap_or(0).max(1);
+        let ((n, e), (m, f)) = (self.noise[at - 1], self.noise[at]);
+        let power = (f / e).ln() / (f64::from(m) / f64::from(n)).ln();
+        e * (samples / f64::from(n)).powf(power)
+    }
+
+    /// The whole error after `samples`.
+    pub fn error_after(&self, samples: f64) -> f64 {
+        self.noise_after(samples).hypot(self.bias)
+    }
+
+    /// The fewest samples after which the error is at most `error`; none where the bias is in the way.
+    fn samples_for(&self, error: f64, most: u32) -> Option<u32> {
+        let room = error * error - (self.bias + self.bias_within).powi(2);
+        let enough = |n: u32| self.noise_after(f64::from(n)).powi(2) <= room;
+        // One sample is at the pixel's middle, which can be better than a few at other places.
+        if room > 0.0 && enough(1) {
+            return Some(1);
+        }
+        (room > 0.0 && enough(most)).then(|| {
+            let (mut low, mut high) = (0, most);
+            while high - low > 1 {
+                let middle = low + (high - low) / 2;
+                if enough(middle) { high = middle } else { low = middle }
+            }
+            high
+        })
+    }
+}
+
+/// Chooses for a picture of `image` pixels of at most `most` samples.
+pub(super) fn choose(pilots: &[Pilot], wish: Wish, image: [u32; 2], calibration: &Calibration, most: u32) -> Chosen {
+    let pixels = f64::from(image[0]) * f64::from(image[1]);
+    let cost = |p: &Pilot| p.ms_per_sample * pixels * calibration.factor(&p.candidate.technique, pixels);
+    let in_time = |p: &Pilot| wish.time_ms.map(|t| ((t / cost(p)).floor().max(1.0) as u32).min(most));
+    let for_error = |p: &Pilot| p.samples_for(AIM * wish.error, most);
+    let fits = |p: &Pilot, n: u32| wish.time_ms.is_none_or(|t| cost(p) * f64::from(n) <= t);
+    let plan_of = |p: &Pilot| for_error(p).filter(|n| fits(p, *n) && wish.says_error);
+    let by_cost = |i: &usize| plan_of(&pilots[*i]).map_or(f64::INFINITY, |n| cost(&pilots[*i]) * f64::from(n));
+    let by_error = |i: &usize| {
+        let p = &pilots[*i];
+        in_time(p).map_or(p.bias, |n| p.error_after(f64::from(n)) + p.bias_within)
+    };
+    let all = || 0..pilots.len();
+    let enough = all().filter(|i| plan_of(&pilots[*i]).is_some()).min_by(|a, b| by_cost(a).total_cmp(&by_cost(b)));
+    let index = enough.or_else(|| all().min_by(|a, b| by_error(a).total_cmp(&by_error(b)))).unwrap_or(0);
+    let best = &pilots[index];
+    let samples = plan_of(best).or_else(|| in_time(best)).unwrap_or(most);
+    let n = f64::from(samples);
+    let (time, error) = (cost(best) * n, best.error_after(n));
+    let considered = pilots.iter().map(|p| considered(p, for_error(p), cost(p), wish)).collect();
+    Chosen {
+        index,
+        samples,
+        enough: enough.is_some(),
+        device_ms: Predicted { value: time, interval: [time / TIME_FACTOR, time * TIME_FACTOR] },
+        error: Predicted { value: error, interval: [error / ERROR_FACTOR, (error + best.bias_within) * ERROR_FACTOR] },
+        reasons: vec![reason(best, samples, time, error, enough.is_some(), wish)],
+        considered,
+    }
+}
+
+fn percent(v: f64) -> String {
+    format!("{:.2} %", 100.0 * v)
+}
+
+fn considered(p: &Pilot, samples: Option<u32>, cost: f64, wish: Wish) -> Considered {
+    let bias = p.bias + p.bias_within;
+    let why = match samples {
+        Some(n) => format!("{n} samples bring it to {}", percent(p.error_after(f64::from(n)))),
+        None if bias >= AIM * wish.error => format!("wrong by up to {} however many samples it takes", percent(bias)),
+        None => "more samples than are permitted would be needed".into(),
+    };
+    Considered {
+        words: p.candidate.words.clone(),
+        technique: p.candidate.technique.clone(),
+        samples,
+        device_ms: samples.map(|n| f64::from(n) * cost),
+        error: samples.map(|n| p.error_after(f64::from(n))),
+        bias: Some(p.bias),
+        enough: samples.is_some(),
+        why,
+    }
+}
+
+fn reason(best: &Pilot, samples: u32, time: f64, error: f64, enough: bool, wish: Wish) -> String {
+    let words = &best.candidate.words;
+    match (enough, wish.time_ms) {
+        (true, _) => {
+            format!(
+                "{words}: the cheapest that is within {}: {samples} samples, about {time:.1} ms on the device",
+                percent(wish.error)
+            )
+        }
+        (false, Some(t)) if wish.says_error => format!(
+            "nothing is within {} in {t} ms; {words} comes nearest: {samples} samples, about {}",
+            percent(wish.error),
+            percent(error)
+        ),
+        (false, Some(t)) => {
+            format!("{words}: the most accurate in {t} ms: {samples} samples, about {}", percent(error))
+        }
+        (false, None) => format!(
+            "nothing that is permitted is within {}; {words} comes nearest, with {}",
+            percent(wish.error),
+            percent(error)
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::super::candidates::Candidate;
+    use super::*;
+
+    fn pilot(words: &str, noise_one: f64, bias: f64, ms: f64) -> Pilot {
+        let candidate =
+            Candidate { technique: "volume_path".into(), own: json!({}), words: words.into(), unbiased: bias == 0.0 };
+        Pilot { candidate, noise: vec![(16, noise_one / 4.0)], bias, bias_within: 0.0, ms_per_sample: ms / 1e4 }
+    }
+
+    fn chosen(pilots: &[Pilot], error: f64, time_ms: Option<f64>, says_error: bool) -> Chosen {
+        choose(pilots, Wish { error, time_ms, says_error }, [100, 100], &Calibration::default(), 1000)
+    }
+
+    #[test]
+    fn the_cheapest_that_is_enough_is_taken() {
+        let pilots = [pilot("all", 1.0, 0.0, 10.0), pilot("some", 1.0, 0.05, 2.0), pilot("few", 1.0, 0.5, 1.0)];
+        // 0.94 × 0.2 = 0.188: √(0.188² − 0.05²) = 0.181, 31 samples of 2 ms.
+        let loose = chosen(&pilots, 0.2, None, true);
+        assert_eq!((loose.index, loose.samples), (1, 31));
+        assert!((loose.device_ms.value - 62.0).abs() < 1e-9 && loose.error.value <= 0.188, "{:?}", loose.device_ms);
+        // 0.047 is less than the bias of 0.05: all paths are needed, 453 of them.
+        let tight = chosen(&pilots, 0.05, None, true);
+        assert_eq!((tight.index, tight.samples), (0, 453));
+        assert!(tight.considered[1].why.contains("however many"), "{:?}", tight.considered[1]);
+    }
+
+    #[test]
+    fn in_a_given_time_the_most_accurate_is_taken() {
+        let pilots = [pilot("all", 1.0, 0.0, 10.0), pilot("some", 1.0, 0.05, 2.0)];
+        let short = chosen(&pilots, 0.02, Some(100.0), false);
+        assert_eq!((short.index, short.samples), (1, 50));
+        let long = chosen(&pilots, 0.02, Some(8000.0), false);
+        assert_eq!((long.index, long.samples), (0, 800));
+        let both = chosen(&pilots, 0.02, Some(100.0), true);
+        assert!(both.reasons[0].contains("nothing is within 2.00 % in 100 ms"), "{:?}", both.reasons);
+    }
+}

@@ -1,0 +1,85 @@
+//! What a scene is like, as far as it decides how much model is needed.
+
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::scene::Scene;
+use crate::scene::depth::greatest_along_axes;
+use crate::scene::medium::MediumRequest;
+use crate::technique::slab::missing;
+use crate::volume::Volume;
+
+/// The features of a scene.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Features {
+    /// Whether every voxel has the same value.
+    pub homogeneous: bool,
+    /// The greatest optical depth along each of the volume's axes, of what scatters; none where nothing does.
+    pub optical_depth: Option<[f64; 3]>,
+    /// The greatest part of a collision that is scattered.
+    pub albedo: Option<f64>,
+    /// What of the light that a slab of the volume's least depth sends back was scattered more than once: the bound by which multiple
+    /// scattering may be left out.
+    pub multiple_scattering: Option<f64>,
+    /// Sides of the smallest voxel over the side of a pixel where the volume's middle is.
+    pub pixels_per_voxel: f64,
+}
+
+impl Features {
+    /// Those of a scene, of the request that it was made of.
+    pub fn of(scene: &Scene, volume: &Volume, request: &Value) -> Self {
+        let medium = medium(request);
+        let depth = medium.as_ref().map(|m| {
+            let sigma = m.sigma_t_per_unit(volume).into_iter().fold(0.0, f64::max);
+            greatest_along_axes(volume, |v| m.density_of(v)).map(|d| sigma * d)
+        });
+        let albedo = medium.as_ref().map(|m| m.albedo.rgb().into_iter().fold(0.0, f64::max));
+        let least = depth.map(|d| d.into_iter().fold(f64::INFINITY, f64::min));
+        Self {
+            homogeneous: volume.non_finite() == 0 && volume.range()[0] == volume.range()[1],
+            optical_depth: depth,
+            albedo,
+            multiple_scattering: least.zip(albedo).map(|(depth, albedo)| missing(depth, albedo, 1)),
+            pixels_per_voxel: pixels_per_voxel(scene, volume),
+        }
+    }
+
+    /// The bound on what is lost where light is followed through so many scatterings.
+    pub fn missing(&self, scatterings: u32) -> f64 {
+        let least = self.optical_depth.map_or(0.0, |d| d.into_iter().fold(f64::INFINITY, f64::min));
+        missing(least, self.albedo.unwrap_or(0.0), scatterings)
+    }
+
+    /// In words, for a reader.
+    pub fn words(&self) -> Vec<String> {
+        let mut words = Vec::new();
+        if self.homogeneous {
+            words.push("the volume is the same everywhere: free paths are a closed form".into());
+        }
+        if let (Some(depth), Some(albedo)) = (self.optical_depth, self.albedo) {
+            let [least, most] =
+                [depth.into_iter().fold(f64::INFINITY, f64::min), depth.into_iter().fold(0.0, f64::max)];
+            words.push(format!("optical depth up to {least:.3} to {most:.3} along its axes, albedo {albedo}"));
+            if albedo == 0.0 {
+                words.push("nothing is scattered: a path ends at its first collision".into());
+            }
+        }
+        words
+    }
+}
+
+/// The medium of a scattering request.
+fn medium(request: &Value) -> Option<MediumRequest> {
+    let technique = request["technique"].as_str()?;
+    if !matches!(technique, "volume_path" | "single_scatter") {
+        return None;
+    }
+    let given = request.get("medium").or_else(|| request[technique].get("medium"));
+    given.map_or_else(|| Some(MediumRequest::default()), |m| serde_json::from_value(m.clone()).ok())
+}
+
+fn pixels_per_voxel(scene: &Scene, volume: &Volume) -> f64 {
+    let voxel = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
+    let pixel = scene.camera().height_at_target() / f64::from(scene.image()[1]);
+    if pixel > 0.0 { voxel / pixel } else { f64::INFINITY }
+}

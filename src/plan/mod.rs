@@ -1,0 +1,209 @@
+//! The planner: model no more than a scene needs.
+//!
+//! A request says what is looked at and how wrong the picture may be or how long it may take. From the scene's [`features`] come the
+//! settings that could do (`candidates`), less those that a bound rules out; a `pilot` of a few thousand pixels measures what each of the
+//! rest costs here and is wrong by; `choose` takes the cheapest that is enough, or the best that is in time, and says why in words.
+//!
+//! What grows how is what the study measured: noise falls as the root of the samples, time is linear in samples and pixels.
+
+mod calibration;
+mod candidates;
+mod choose;
+pub mod features;
+mod pilot;
+
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use crate::config::Limits;
+use crate::error::{Error, Result};
+use crate::job::Engine;
+use crate::scene::{Scene, Subject};
+use crate::volume::Store;
+pub use calibration::Calibrations;
+pub use candidates::is_auto;
+use candidates::{Candidate, Family};
+use features::Features;
+
+/// What is asked for where the budget is silent.
+const USUAL_ERROR: f64 = 0.02;
+
+/// How many more samples than planned a render may take until its noise is what was planned.
+const UNFORESEEN: u32 = 3;
+
+/// A number with the interval that it is expected in.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Predicted {
+    /// The expectation.
+    pub value: f64,
+    /// The least and the most that it should be, in about nine of ten cases.
+    pub interval: [f64; 2],
+}
+
+/// A setting that was considered.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Considered {
+    /// What it is, in words.
+    pub words: String,
+    /// Its technique.
+    pub technique: String,
+    /// Samples per pixel that it would take for the error asked for, or could take in the time.
+    pub samples: Option<u32>,
+    /// What it would take, device milliseconds.
+    pub device_ms: Option<f64>,
+    /// What it would be wrong by, relative.
+    pub error: Option<f64>,
+    /// What it is wrong by however many samples it takes.
+    pub bias: Option<f64>,
+    /// Whether it is enough.
+    pub enough: bool,
+    /// Why it is, or is not.
+    pub why: String,
+}
+
+/// A plan.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Plan {
+    /// The technique.
+    pub technique: String,
+    /// Its own parameters.
+    pub options: Value,
+    /// Samples per pixel.
+    pub samples: u32,
+    /// Time on the device, ms.
+    pub device_ms: Predicted,
+    /// The error, relative.
+    pub error: Predicted,
+    /// Why, in words.
+    pub reasons: Vec<String>,
+    /// Every setting that was considered.
+    pub considered: Vec<Considered>,
+    /// What the scene is like.
+    pub features: Features,
+    /// The request to post: this plan carried out.
+    pub request: Value,
+}
+
+/// What planning needs.
+pub struct Planner<'a> {
+    /// Runs the pilots.
+    pub engine: &'a Engine,
+    /// Has the volumes.
+    pub store: &'a Store,
+    /// What is permitted.
+    pub limits: &'a Limits,
+    /// What is known of this device.
+    pub calibrations: &'a Calibrations,
+}
+
+impl Planner<'_> {
+    /// Plans a request whose technique is `auto`, or a view of which only what is not given is planned.
+    ///
+    /// # Errors
+    /// Those of the request; [`Error::Invalid`] for a volume that is yet to be computed.
+    pub async fn plan(&self, body: &Value) -> Result<Plan> {
+        let family = Family::of(body);
+        let base = candidates::with_technique(body, family.technique());
+        let scene = self.scene(&base)?;
+        let Subject::Volume(volume) = scene.subject() else {
+            let permitted = "a volume that is there; fetch the field and upload it";
+            return Err(Error::invalid("/volume", "a plan needs to see the volume", permitted));
+        };
+        let features = Features::of(&scene, volume, &base);
+        let wish = Wish::of(&scene);
+        let (candidates, mut considered) = candidates::candidates(body, family, &features, wish.error);
+        let possible: Vec<Candidate> =
+            candidates.into_iter().filter(|c| self.scene(&c.request(body)).is_ok()).collect();
+        let pilots = pilot::run_all(self, body, scene.image(), &possible).await?;
+        let calibration = self.calibrations.of(self).await?;
+        let chosen = choose::choose(&pilots, wish, scene.image(), &calibration, self.limits.max_samples);
+        considered.splice(0..0, chosen.considered);
+        let best = &pilots[chosen.index];
+        let mut request = best.candidate.request(body);
+        request["budget"] = budget(best, [chosen.samples, self.limits.max_samples], chosen.enough, wish);
+        let mut reasons = features.words();
+        reasons.extend(chosen.reasons);
+        Ok(Plan {
+            technique: best.candidate.technique.clone(),
+            options: best.candidate.own.clone(),
+            samples: chosen.samples,
+            device_ms: chosen.device_ms,
+            error: chosen.error,
+            reasons,
+            considered,
+            features,
+            request,
+        })
+    }
+
+    /// Every setting that could be chosen, whatever a bound says of it, in words and as a request; the first is the reference.
+    ///
+    /// # Errors
+    /// Those of the request.
+    pub fn settings(&self, body: &Value) -> Result<Vec<(String, Value)>> {
+        let family = Family::of(body);
+        let base = candidates::with_technique(body, family.technique());
+        let scene = self.scene(&base)?;
+        let Subject::Volume(volume) = scene.subject() else { return Ok(Vec::new()) };
+        let features = Features::of(&scene, volume, &base);
+        let (candidates, _) = candidates::candidates(body, family, &features, f64::INFINITY);
+        let requests = candidates.into_iter().map(|c| (c.words.clone(), c.request(body)));
+        Ok(requests.filter(|(_, request)| self.scene(request).is_ok()).collect())
+    }
+
+    /// The request to render, and what the planner says of it: of another technique than `auto` the request as it is.
+    ///
+    /// # Errors
+    /// As [`Planner::plan`].
+    pub async fn resolve(&self, body: Value) -> Result<(Value, Option<Value>)> {
+        if !is_auto(&body) {
+            return Ok((body, None));
+        }
+        let plan = self.plan(&body).await?;
+        let request = plan.request.clone();
+        let mut words = serde_json::to_value(plan).map_err(Error::internal)?;
+        if let Some(words) = words.as_object_mut() {
+            words.retain(|name, _| name != "request");
+        }
+        Ok((request, Some(words)))
+    }
+
+    fn scene(&self, request: &Value) -> Result<Scene> {
+        // A volume may have to be decoded first: the runtime's other work goes on meanwhile.
+        tokio::task::block_in_place(|| Scene::from_json(request, self.store, self.limits))
+    }
+}
+
+/// Of random paths the film knows the noise better than a pilot: the render goes on until it is what the bias leaves room for. A stepping
+/// view takes its samples to be random when it states its noise, which they are better than: it takes as many as were planned.
+fn budget(best: &pilot::Pilot, [samples, most]: [u32; 2], enough: bool, wish: Wish) -> Value {
+    let room = (choose::AIM * wish.error).powi(2) - (best.bias + best.bias_within).powi(2);
+    let mut budget = json!({"samples": samples});
+    if enough && best.is_random() && room > 0.0 {
+        budget = json!({"samples": samples.saturating_mul(UNFORESEEN).min(most), "max_error": room.sqrt()});
+    }
+    if let Some(time) = wish.time_ms {
+        budget["time_ms"] = json!(time as u64);
+    }
+    budget
+}
+
+/// What is asked for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Wish {
+    error: f64,
+    time_ms: Option<f64>,
+    /// Whether the error was asked for, or is only the usual one.
+    says_error: bool,
+}
+
+impl Wish {
+    fn of(scene: &Scene) -> Self {
+        let budget = scene.budget();
+        Self {
+            error: budget.max_error.unwrap_or(USUAL_ERROR),
+            time_ms: budget.time_ms.map(|t| t as f64),
+            says_error: budget.max_error.is_some() || budget.time_ms.is_none(),
+        }
+    }
+}
