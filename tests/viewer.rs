@@ -208,6 +208,7 @@ async fn the_charts_page_shows_what_was_measured() {
     page.settled().await;
     page.find("header a[href='charts.html']").await.click().await.expect("the link to the charts");
     page.until("the table of what to choose", "document.querySelectorAll('#choose tr').length > 10").await;
+    page.js("document.querySelector('#cases').scrollIntoView()").await;
     page.until("a chart", "[...document.querySelectorAll('#cases img')].some((chart) => chart.naturalWidth > 100)")
         .await;
     let verdicts = page.text("#verdicts").await;
