@@ -13,6 +13,8 @@ mod commands;
 mod info;
 #[path = "api/openapi.rs"]
 mod openapi;
+#[path = "api/plans.rs"]
+mod plans;
 #[path = "api/renders.rs"]
 mod renders;
 #[path = "api/scattering.rs"]

@@ -1,5 +1,5 @@
-//! What is known of this device: by how much a sample is cheaper or dearer in a large picture than in a pilot. Measured once, in less
-//! than three seconds, and kept in the data folder.
+//! What is known of this device: by how much a sample is cheaper or dearer in a large picture than in a pilot, and what a render costs
+//! before its first sample is whole. Measured once, in less than three seconds, and kept in the data folder.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -14,8 +14,9 @@ use crate::error::Result;
 /// Techniques that are calibrated: one a family.
 const TECHNIQUES: [&str; 3] = ["emission_absorption", "volume_path", "isosurface"];
 /// Side of the large picture, and samples of it and of the pilot.
-const LARGE: u32 = 384;
-const SAMPLES: [u32; 2] = [2, 16];
+const LARGE: u32 = 256;
+const SAMPLES: [u32; 2] = [1, 12];
+const PILOT_SAMPLES: u32 = 16;
 /// Pixels of the pilot and of the large picture, between which is interpolated.
 const PIXELS: [f64; 2] = [4096.0, (LARGE * LARGE) as f64];
 
@@ -25,16 +26,35 @@ pub struct Calibration {
     /// The device with its driver, and this program's version: another is calibrated anew.
     of: String,
     /// By technique: the time of a sample in the large picture over that in the pilot.
-    large_over_pilot: BTreeMap<String, f64>,
+    factors: BTreeMap<String, Factors>,
+}
+
+/// Those of one technique.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Factors {
+    /// The time of a sample in the large picture over that in the pilot.
+    large_over_pilot: f64,
+    /// What a render costs besides its samples, in samples: previews, and slices that are short until the kernel's speed is known.
+    besides: f64,
 }
 
 impl Calibration {
+    fn of(&self, technique: &str) -> Factors {
+        let known = |name: &str| self.factors.get(name).copied();
+        known(technique)
+            .or_else(|| known("emission_absorption"))
+            .unwrap_or(Factors { large_over_pilot: 1.0, besides: 0.0 })
+    }
+
     /// What the time of a sample in a pilot is multiplied by, for a picture of so many pixels.
     pub fn factor(&self, technique: &str, pixels: f64) -> f64 {
-        let known = |name: &str| self.large_over_pilot.get(name).copied();
-        let large = known(technique).or_else(|| known("emission_absorption")).unwrap_or(1.0);
         let part = (pixels / PIXELS[0]).ln() / (PIXELS[1] / PIXELS[0]).ln();
-        large.powf(part.clamp(0.0, 1.0))
+        self.of(technique).large_over_pilot.powf(part.clamp(0.0, 1.0))
+    }
+
+    /// What a render costs besides its samples, in samples.
+    pub fn besides(&self, technique: &str) -> f64 {
+        self.of(technique).besides
     }
 }
 
@@ -66,11 +86,11 @@ impl Calibrations {
         if let Some(kept) = kept.filter(|k| k.of == of) {
             return Ok(kept);
         }
-        let mut large_over_pilot = BTreeMap::new();
+        let mut factors = BTreeMap::new();
         for technique in TECHNIQUES {
-            large_over_pilot.insert(technique.to_owned(), ratio(planner, technique).await?);
+            factors.insert(technique.to_owned(), measure(planner, technique).await?);
         }
-        let found = Calibration { of, large_over_pilot };
+        let found = Calibration { of, factors };
         // What cannot be kept is measured again next time.
         if let Err(error) = serde_json::to_vec_pretty(&found).map(|text| std::fs::write(&self.file, text)) {
             tracing::warn!(%error, "the calibration is not kept");
@@ -79,19 +99,24 @@ impl Calibrations {
     }
 }
 
-/// The time of a sample in a large picture over that in a pilot, of the built-in smoke.
-async fn ratio(planner: &Planner<'_>, technique: &str) -> Result<f64> {
+/// The factors of a technique, on the built-in smoke.
+async fn measure(planner: &Planner<'_>, technique: &str) -> Result<Factors> {
     let time = async |side: u32, samples: u32| -> Result<f64> {
         let mut least = f64::INFINITY;
-        for seed in 0..3 {
+        for seed in 0..4 {
             let request = json!({"technique": technique, "volume": {"builtin": "smoke", "resolution": 64}, "seed": seed,
                 "image": {"width": side, "height": side}, "budget": {"samples": samples}});
-            let (_, _, device_ms) = pilot::finish(planner, request).await?;
-            least = least.min(device_ms / (f64::from(samples) * f64::from(side).powi(2)));
+            least = least.min(pilot::finish(planner, request).await?.2);
         }
         Ok(least)
     };
-    let small = time(PIXELS[0].sqrt() as u32, SAMPLES[1]).await?;
-    let large = time(LARGE, SAMPLES[0]).await?;
-    Ok(if small > 0.0 { (large / small).clamp(0.1, 10.0) } else { 1.0 })
+    let small = time(PIXELS[0].sqrt() as u32, PILOT_SAMPLES).await? / (f64::from(PILOT_SAMPLES) * PIXELS[0]);
+    let [one, many] = [time(LARGE, SAMPLES[0]).await?, time(LARGE, SAMPLES[1]).await?];
+    let more = f64::from(SAMPLES[1] - SAMPLES[0]);
+    let sample = (many - one) / more;
+    let known = small > 0.0 && sample > 0.0;
+    Ok(Factors {
+        large_over_pilot: if known { (sample / PIXELS[1] / small).clamp(0.1, 10.0) } else { 1.0 },
+        besides: if known { (one / sample - f64::from(SAMPLES[0])).clamp(0.0, 10.0) } else { 0.0 },
+    })
 }

@@ -38,7 +38,7 @@ impl Pilot {
     /// The noise after `samples`: along the curve that was looked at, and beyond it as the root of the samples.
     pub fn noise_after(&self, samples: f64) -> f64 {
         let Some((last, error)) = self.noise.last() else { return 0.0 };
-        let beyond = error * (f64::from(*last) / samples).sqrt();
+        let beyond = error * (f64::from(*last) / samples).powf(self.power());
         if samples >= f64::from(*last) || self.noise.len() < 2 {
             return beyond;
         }
@@ -46,6 +46,14 @@ impl Pilot {
         let ((n, e), (m, f)) = (self.noise[at - 1], self.noise[at]);
         let power = (f / e).ln() / (f64::from(m) / f64::from(n)).ln();
         e * (samples / f64::from(n)).powf(power)
+    }
+
+    /// The power of the samples that the noise falls by: a half of random ones, up to 1 of places that are spread evenly.
+    fn power(&self) -> f64 {
+        match self.noise.as_slice() {
+            [.., (n, e), (m, f)] if *f > 0.0 => ((e / f).ln() / (f64::from(*m) / f64::from(*n)).ln()).clamp(0.5, 1.0),
+            _ => 0.5,
+        }
     }
 
     /// The whole error after `samples`.
@@ -57,9 +65,9 @@ impl Pilot {
     fn samples_for(&self, error: f64, most: u32) -> Option<u32> {
         let room = error * error - (self.bias + self.bias_within).powi(2);
         let enough = |n: u32| self.noise_after(f64::from(n)).powi(2) <= room;
-        // One sample is at the pixel's middle, which can be better than a few at other places.
-        if room > 0.0 && enough(1) {
-            return Some(1);
+        // Evenly spread places are looked at where their curve is: one at the pixel's middle can be better than a few at other places.
+        if !self.is_random() {
+            return (0..).map(|i| 4u32.saturating_pow(i)).take_while(|n| *n <= most).find(|n| room > 0.0 && enough(*n));
         }
         (room > 0.0 && enough(most)).then(|| {
             let (mut low, mut high) = (0, most);
@@ -74,13 +82,33 @@ impl Pilot {
 
 /// Chooses for a picture of `image` pixels of at most `most` samples.
 pub(super) fn choose(pilots: &[Pilot], wish: Wish, image: [u32; 2], calibration: &Calibration, most: u32) -> Chosen {
+    choose_among(pilots, None, wish, image, calibration, most)
+}
+
+/// The same where one pilot, `whole`, was of the whole picture, and its time needs no factor.
+pub(super) fn choose_among(
+    pilots: &[Pilot],
+    whole: Option<usize>,
+    wish: Wish,
+    image: [u32; 2],
+    calibration: &Calibration,
+    most: u32,
+) -> Chosen {
     let pixels = f64::from(image[0]) * f64::from(image[1]);
-    let cost = |p: &Pilot| p.ms_per_sample * pixels * calibration.factor(&p.candidate.technique, pixels);
-    let in_time = |p: &Pilot| wish.time_ms.map(|t| ((t / cost(p)).floor().max(1.0) as u32).min(most));
+    let cost = |p: &Pilot, samples: u32| {
+        let is_whole = whole.is_some_and(|i| std::ptr::eq(p, &pilots[i]));
+        let factor = if is_whole { 1.0 } else { calibration.factor(&p.candidate.technique, pixels) };
+        let sample = p.ms_per_sample * pixels * factor;
+        sample * (f64::from(samples) + calibration.besides(&p.candidate.technique))
+    };
+    let in_time = |p: &Pilot| {
+        let sample = cost(p, 1) - cost(p, 0);
+        wish.time_ms.map(|t| (((t - cost(p, 0)) / sample).floor().max(1.0) as u32).min(most))
+    };
     let for_error = |p: &Pilot| p.samples_for(AIM * wish.error, most);
-    let fits = |p: &Pilot, n: u32| wish.time_ms.is_none_or(|t| cost(p) * f64::from(n) <= t);
+    let fits = |p: &Pilot, n: u32| wish.time_ms.is_none_or(|t| cost(p, n) <= t);
     let plan_of = |p: &Pilot| for_error(p).filter(|n| fits(p, *n) && wish.says_error);
-    let by_cost = |i: &usize| plan_of(&pilots[*i]).map_or(f64::INFINITY, |n| cost(&pilots[*i]) * f64::from(n));
+    let by_cost = |i: &usize| plan_of(&pilots[*i]).map_or(f64::INFINITY, |n| cost(&pilots[*i], n));
     let by_error = |i: &usize| {
         let p = &pilots[*i];
         in_time(p).map_or(p.bias, |n| p.error_after(f64::from(n)) + p.bias_within)
@@ -91,8 +119,8 @@ pub(super) fn choose(pilots: &[Pilot], wish: Wish, image: [u32; 2], calibration:
     let best = &pilots[index];
     let samples = plan_of(best).or_else(|| in_time(best)).unwrap_or(most);
     let n = f64::from(samples);
-    let (time, error) = (cost(best) * n, best.error_after(n));
-    let considered = pilots.iter().map(|p| considered(p, for_error(p), cost(p), wish)).collect();
+    let (time, error) = (cost(best, samples), best.error_after(n));
+    let considered = pilots.iter().map(|p| considered(p, for_error(p).map(|n| (n, cost(p, n))), wish)).collect();
     Chosen {
         index,
         samples,
@@ -108,8 +136,9 @@ fn percent(v: f64) -> String {
     format!("{:.2} %", 100.0 * v)
 }
 
-fn considered(p: &Pilot, samples: Option<u32>, cost: f64, wish: Wish) -> Considered {
+fn considered(p: &Pilot, enough: Option<(u32, f64)>, wish: Wish) -> Considered {
     let bias = p.bias + p.bias_within;
+    let samples = enough.map(|e| e.0);
     let why = match samples {
         Some(n) => format!("{n} samples bring it to {}", percent(p.error_after(f64::from(n)))),
         None if bias >= AIM * wish.error => format!("wrong by up to {} however many samples it takes", percent(bias)),
@@ -119,7 +148,7 @@ fn considered(p: &Pilot, samples: Option<u32>, cost: f64, wish: Wish) -> Conside
         words: p.candidate.words.clone(),
         technique: p.candidate.technique.clone(),
         samples,
-        device_ms: samples.map(|n| f64::from(n) * cost),
+        device_ms: enough.map(|e| e.1),
         error: samples.map(|n| p.error_after(f64::from(n))),
         bias: Some(p.bias),
         enough: samples.is_some(),

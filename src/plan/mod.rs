@@ -28,8 +28,8 @@ use features::Features;
 /// What is asked for where the budget is silent.
 const USUAL_ERROR: f64 = 0.02;
 
-/// How many more samples than planned a render may take until its noise is what was planned.
-const UNFORESEEN: u32 = 3;
+/// Of fewer samples than these the film knows its noise less well than a pilot.
+const FEW: u32 = 8;
 
 /// A number with the interval that it is expected in.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -102,6 +102,9 @@ impl Planner<'_> {
     /// # Errors
     /// Those of the request; [`Error::Invalid`] for a volume that is yet to be computed.
     pub async fn plan(&self, body: &Value) -> Result<Plan> {
+        if !body.is_object() {
+            return Err(Error::invalid("", "not an object", "a JSON object such as a render's"));
+        }
         let family = Family::of(body);
         let base = candidates::with_technique(body, family.technique());
         let scene = self.scene(&base)?;
@@ -114,13 +117,22 @@ impl Planner<'_> {
         let (candidates, mut considered) = candidates::candidates(body, family, &features, wish.error);
         let possible: Vec<Candidate> =
             candidates.into_iter().filter(|c| self.scene(&c.request(body)).is_ok()).collect();
-        let pilots = pilot::run_all(self, body, scene.image(), &possible).await?;
+        let mut pilots = pilot::run_all(self, body, scene.image(), &possible).await?;
         let calibration = self.calibrations.of(self).await?;
-        let chosen = choose::choose(&pilots, wish, scene.image(), &calibration, self.limits.max_samples);
+        let image = scene.image();
+        let most = self.limits.max_samples;
+        let mut chosen = choose::choose(&pilots, wish, image, &calibration, most);
+        if chosen.samples > pilot::CONFIRMED {
+            let likely = &pilots[chosen.index];
+            let besides = calibration.besides(&likely.candidate.technique);
+            pilots[chosen.index] = pilot::confirm(self, body, image, likely, besides).await?;
+            let known = Some(chosen.index);
+            chosen = choose::choose_among(&pilots, known, wish, image, &calibration, most);
+        }
         considered.splice(0..0, chosen.considered);
         let best = &pilots[chosen.index];
         let mut request = best.candidate.request(body);
-        request["budget"] = budget(best, [chosen.samples, self.limits.max_samples], chosen.enough, wish);
+        request["budget"] = budget(best, chosen.samples, chosen.enough, wish);
         let mut reasons = features.words();
         reasons.extend(chosen.reasons);
         Ok(Plan {
@@ -156,7 +168,7 @@ impl Planner<'_> {
     /// # Errors
     /// As [`Planner::plan`].
     pub async fn resolve(&self, body: Value) -> Result<(Value, Option<Value>)> {
-        if !is_auto(&body) {
+        if !body.is_object() || !is_auto(&body) {
             return Ok((body, None));
         }
         let plan = self.plan(&body).await?;
@@ -174,13 +186,13 @@ impl Planner<'_> {
     }
 }
 
-/// Of random paths the film knows the noise better than a pilot: the render goes on until it is what the bias leaves room for. A stepping
-/// view takes its samples to be random when it states its noise, which they are better than: it takes as many as were planned.
-fn budget(best: &pilot::Pilot, [samples, most]: [u32; 2], enough: bool, wish: Wish) -> Value {
+/// A plan's samples are enough by what the pilots know; where the film finds that it is so sooner, the render stops.
+fn budget(best: &pilot::Pilot, samples: u32, enough: bool, wish: Wish) -> Value {
     let room = (choose::AIM * wish.error).powi(2) - (best.bias + best.bias_within).powi(2);
     let mut budget = json!({"samples": samples});
-    if enough && best.is_random() && room > 0.0 {
-        budget = json!({"samples": samples.saturating_mul(UNFORESEEN).min(most), "max_error": room.sqrt()});
+    // A stepping view's film takes its places for random, and would have it go on for long.
+    if enough && best.is_random() && room > 0.0 && samples >= FEW {
+        budget["max_error"] = json!(room.sqrt());
     }
     if let Some(time) = wish.time_ms {
         budget["time_ms"] = json!(time as u64);

@@ -1,8 +1,9 @@
 //! A few thousand pixels of each candidate: what it costs on this device, and what it is wrong by.
 //!
 //! What is left out is the mean over the pixels of d₁ d₂, where d is the difference to the reference with seeds of their own: noise of the
-//! two is independent and averages to nothing. Of random paths the noise is the film's own estimate. Of steps along a ray, whose places are
-//! better spread than random ones, it is the difference to the shortest step, for one sample a pixel and for more.
+//! two is independent and averages to nothing. Of random paths the noise is the film's own estimate, and a plan of many samples is confirmed
+//! by the first few of the picture itself. Of steps along a ray, whose places are far better spread than the random ones that the film takes
+//! them for, it is the difference to the shortest step, for one sample a pixel and for more.
 
 use serde_json::{Value, json};
 
@@ -13,12 +14,14 @@ use crate::job::State;
 
 /// Pixels of a pilot.
 const PIXELS: f64 = 4096.0;
-/// Samples of a pilot of random paths.
+/// Samples of a pilot.
 const SAMPLES: u32 = 16;
 /// Samples of a stepping view: where its curve is looked at.
 const CURVE: [u32; 3] = [1, 4, 16];
 /// Samples of the view that the curve is compared with.
-const REFERENCE: u32 = 32;
+const REFERENCE: u32 = 64;
+/// Samples of the whole picture with the chosen setting; a plan of no more is not confirmed.
+pub const CONFIRMED: u32 = 4;
 /// Groups of pixels of which the spread tells how well a bias is known.
 const GROUPS: usize = 16;
 
@@ -27,7 +30,7 @@ const GROUPS: usize = 16;
 pub struct Pilot {
     /// Of what.
     pub candidate: Candidate,
-    /// The error after so many samples, relative, without the bias.
+    /// The noise after so many samples, relative.
     pub noise: Vec<(u32, f64)>,
     /// What more samples do not take away, relative,
     pub bias: f64,
@@ -210,6 +213,25 @@ async fn finer(planner: &Planner<'_>, body: &Value, candidate: &Candidate, image
     }
     let power = if errors[1] > 0.0 { (errors[0] / errors[1]).log2().clamp(0.3, 1.2) } else { 0.5 };
     Ok((f64::from(small[1]) / f64::from(image[1])).powf(power))
+}
+
+/// The first samples of the picture itself, with the setting that is likely to be chosen: of random paths their noise, and their time
+/// without what a render costs besides its samples.
+///
+/// # Errors
+/// Those of the request.
+pub async fn confirm(
+    planner: &Planner<'_>,
+    body: &Value,
+    image: [u32; 2],
+    pilot: &Pilot,
+    besides: f64,
+) -> Result<Pilot> {
+    let run = run(planner, body, &pilot.candidate, image, CONFIRMED, 1).await?;
+    let scale = mean(run.luminance.iter().copied()).abs().max(f64::MIN_POSITIVE);
+    let samples = f64::from(CONFIRMED);
+    let noise = if pilot.is_random() { vec![(CONFIRMED, run.noise / scale)] } else { pilot.noise.clone() };
+    Ok(Pilot { noise, ms_per_sample: run.ms_per_sample * samples / (samples + besides), ..pilot.clone() })
 }
 
 #[cfg(test)]

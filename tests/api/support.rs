@@ -61,6 +61,11 @@ impl Api {
         self.request(Method::PUT, path).json(body).send().await.unwrap()
     }
 
+    /// Posts JSON to a path.
+    pub async fn post_to(&self, path: &str, body: &Value) -> Response {
+        self.request(Method::POST, path).header("Accept", "application/json").json(body).send().await.unwrap()
+    }
+
     /// Posts a render, asking for `accept`.
     pub async fn post(&self, body: &Value, accept: &str) -> Response {
         self.request(Method::POST, "/v1/renders").header("Accept", accept).json(body).send().await.unwrap()

@@ -1,0 +1,112 @@
+//! `POST /v1/plan`, and renders whose technique is `auto`.
+
+use serde_json::{Value, json};
+
+use super::support::*;
+
+async fn plan(api: &Api, body: &Value) -> Value {
+    let response = api.post_to("/v1/plan", body).await;
+    assert_eq!(response.status(), 200, "{}", response.text().await.unwrap());
+    response.json().await.unwrap()
+}
+
+fn fog(sigma: f64, albedo: f64, budget: &Value) -> Value {
+    json!({"technique": "auto", "volume": {"builtin": "smoke", "resolution": 32}, "image": {"width": 120, "height": 90}, "budget": budget,
+        "medium": {"sigma_t_per_unit": sigma, "albedo": albedo}, "lights": [{"type": "sun"}, {"type": "sky", "radiance": 0.1}]})
+}
+
+fn considered<'a>(plan: &'a Value, words: &str) -> &'a Value {
+    let all = plan["considered"].as_array().unwrap();
+    all.iter().find(|c| c["words"].as_str().unwrap().starts_with(words)).unwrap_or_else(|| panic!("{words} in {all:?}"))
+}
+
+#[tokio::test]
+async fn a_plan_says_what_it_takes_and_why_and_can_be_posted() {
+    let server = shared();
+    let api = Api::new(&server);
+    for body in [
+        json!({"image": {"width": 96, "height": 72}}),
+        fog(5.0, 0.9, &json!({"max_error": 0.05})),
+        json!({"technique": "auto", "volume": {"builtin": "gaussian", "resolution": 32}, "isosurface": {"isovalue": 0.5},
+            "image": {"width": 96, "height": 72}, "budget": {"max_error": 0.05}}),
+    ] {
+        let plan = plan(&api, &body).await;
+        for number in ["device_ms", "error"] {
+            let (value, interval) = (plan[number]["value"].as_f64().unwrap(), &plan[number]["interval"]);
+            let ends = [0, 1].map(|i| interval[i].as_f64().unwrap());
+            assert!(value > 0.0 && ends[0] <= value && value <= ends[1], "{number}: {}", plan[number]);
+        }
+        assert!(plan["reasons"].as_array().is_some_and(|r| !r.is_empty()), "{plan}");
+        assert!(plan["considered"].as_array().unwrap().iter().any(|c| c["enough"] == true), "{plan}");
+        let done = api.finish(&plan["request"]).await;
+        assert_eq!(done["plan"]["technique"], plan["technique"]);
+        assert!(done["samples"].as_u64() <= plan["samples"].as_u64(), "{} of {}", done["samples"], plan["samples"]);
+    }
+}
+
+#[tokio::test]
+async fn models_are_dropped_where_a_bound_permits_it_and_not_elsewhere() {
+    let server = shared();
+    let api = Api::new(&server);
+    let thick = plan(&api, &fog(20.0, 0.95, &json!({"max_error": 0.05}))).await;
+    let single = considered(&thick, "single_scatter");
+    assert_eq!(single["enough"], false);
+    assert!(single["why"].as_str().unwrap().contains("would lack"), "{single}");
+    assert_eq!(thick["technique"], "volume_path");
+    let thin = plan(&api, &fog(0.001, 0.9, &json!({"max_error": 0.05}))).await;
+    assert_eq!(considered(&thin, "single_scatter")["enough"], true, "{thin}");
+    let black = plan(&api, &fog(5.0, 0.0, &json!({"max_error": 0.1}))).await;
+    assert!(black["reasons"].to_string().contains("nothing is scattered"), "{}", black["reasons"]);
+    let mut even = fog(1.0, 0.5, &json!({"max_error": 0.1}));
+    even["volume"] = json!({"builtin": "constant", "resolution": 16});
+    let even = plan(&api, &even).await;
+    assert!(even["reasons"].to_string().contains("closed form") && even["features"]["homogeneous"] == true, "{even}");
+}
+
+#[tokio::test]
+async fn an_automatic_render_is_planned_rendered_and_explained() {
+    let server = shared();
+    let api = Api::new(&server);
+    let body = fog(5.0, 0.9, &json!({"max_error": 0.05}));
+    assert!(colours(&api.png(&body).await) > 20);
+    let done = api.finish(&body).await;
+    assert!(done["error"].as_f64().is_some_and(|e| e <= 0.05), "{}", done["error"]);
+    let planned = &done["plan"]["planned"];
+    assert!(planned["reasons"].as_array().is_some_and(|r| !r.is_empty()), "{planned}");
+    assert_eq!(planned["technique"], done["plan"]["technique"]);
+    // Pilots are not renders of anybody's.
+    let listed = api.get_json("/v1/renders").await;
+    let small = |r: &Value| r["image"] == json!([74, 55]);
+    assert!(!listed["renders"].as_array().unwrap().iter().any(small), "{listed}");
+}
+
+#[tokio::test]
+async fn a_time_that_is_too_short_is_said_to_be() {
+    let server = shared();
+    let api = Api::new(&server);
+    let both = plan(&api, &fog(8.0, 0.95, &json!({"max_error": 0.0005, "time_ms": 20}))).await;
+    assert!(both["reasons"].to_string().contains("nothing is within 0.05 % in 20 ms"), "{}", both["reasons"]);
+    assert_eq!(both["request"]["budget"]["time_ms"], 20);
+    let time = plan(&api, &fog(8.0, 0.95, &json!({"time_ms": 50}))).await;
+    assert!(time["reasons"].to_string().contains("the most accurate in 50 ms"), "{}", time["reasons"]);
+}
+
+#[tokio::test]
+async fn what_cannot_be_planned_names_its_field() {
+    let server = shared();
+    let api = Api::new(&server);
+    for (body, pointer) in [
+        (json!({"technique": "auto", "volume": {"photon_transport": {"photons": 1000}}}), "/volume"),
+        (json!({"technique": "auto", "medium": {"albedo": 2}}), "/medium/albedo"),
+        (json!({"technique": "auto", "image": {"width": 0}}), "/image/width"),
+        (json!({"technique": "auto", "budget": {"max_error": -1}}), "/budget/max_error"),
+        (json!({"technique": "auto", "emission_absorption": {"step_voxels": 99}}), "/emission_absorption/step_voxels"),
+        (json!({"technique": "auto", "nonsense": 1}), "/nonsense"),
+    ] {
+        for path in ["/v1/plan", "/v1/renders"] {
+            let told = problem(api.post_to(path, &body).await, 422, &body.to_string()).await;
+            names(&told, pointer, &format!("{path}: {body}"));
+        }
+    }
+    problem(api.post_to("/v1/plan", &json!([1])).await, 422, "not an object").await;
+}
