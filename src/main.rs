@@ -15,6 +15,7 @@ use cloudchamber::plan::{Calibrations, Planner};
 use cloudchamber::scene::Scene;
 use cloudchamber::study;
 use cloudchamber::study::shelf::{PLANNER, STABILITY, Shelf};
+use cloudchamber::technique;
 use cloudchamber::volume::Store;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
@@ -36,7 +37,7 @@ enum Command {
     /// Measure speed against accuracy: every technique against truths that it had no part in
     Study(Box<StudyArgs>),
     /// Show the OpenCL devices here and the one that would be used
-    Device(DeviceArgs),
+    Device(Box<ShowArgs>),
     /// Exit 0 if the server at the address answers
     Healthcheck {
         /// Address of the server
@@ -65,6 +66,15 @@ struct RenderArgs {
     device: DeviceArgs,
     #[command(flatten)]
     limits: Limits,
+}
+
+#[derive(clap::Args)]
+struct ShowArgs {
+    #[command(flatten)]
+    device: DeviceArgs,
+    /// List the kernels' variants instead: what each is built with, and which are built at the start
+    #[arg(long)]
+    variants: bool,
 }
 
 #[derive(clap::Args)]
@@ -110,7 +120,7 @@ fn run(command: Command) -> Result<()> {
         Command::Serve(config) => Some(&config.device),
         Command::Render(args) => Some(&args.device),
         Command::Study(args) => Some(&args.device),
-        Command::Device(device) => Some(device),
+        Command::Device(args) => Some(&args.device),
         Command::Healthcheck { .. } => None,
     };
     if let Some(device) = device {
@@ -124,7 +134,8 @@ fn run(command: Command) -> Result<()> {
             Command::Study(args) => {
                 tokio::task::spawn_blocking(move || run_studies(&args)).await.map_err(Error::internal)?
             }
-            Command::Device(args) => show_devices(&args),
+            Command::Device(args) if args.variants => show_variants(&args.device),
+            Command::Device(args) => show_devices(&args.device),
             Command::Healthcheck { listen } => client::healthcheck(&format!("http://{listen}")).await,
         }
     });
@@ -278,11 +289,10 @@ fn run_studies(args: &StudyArgs) -> Result<()> {
     if experiments.iter().any(experiment) {
         let found = study::stability::stability(&bench, scale, &experiment, &mut told)?;
         print!("{}", found.page());
-        let silent = found.experiments.iter().find(|e| !e.verdict.is_told()).map(|e| e.name.clone());
-        shelf.put_stability(found)?;
-        if let Some(name) = silent {
-            return Err(Error::internal(format!("{name}: a method is wrong and silent")));
+        if let Some(silent) = found.experiments.iter().find(|e| !e.verdict.is_told()) {
+            return Err(Error::internal(format!("{}: a method is wrong and silent", silent.name)));
         }
+        shelf.put_stability(found)?;
     }
     if asked(PLANNER) {
         let found = study::planner::planner(&bench, scale, &mut told)?;
@@ -299,5 +309,26 @@ fn show_devices(args: &DeviceArgs) -> Result<()> {
     let (_, used) = device::select(&args.device, args.lanes)?;
     let text = serde_json::to_string_pretty(&json!({"devices": all, "would_use": used})).map_err(Error::internal)?;
     println!("{text}");
+    Ok(())
+}
+
+/// Every variant of every kernel: a render builds those that its plan needs, and those that are common are built at the start.
+fn show_variants(args: &DeviceArgs) -> Result<()> {
+    let (_, used) = device::select(&args.device, args.lanes)?;
+    let mut variants = Vec::new();
+    for technique in technique::ALL {
+        let source = (technique.source)();
+        for (i, variant) in (source.variants)().iter().enumerate() {
+            let features: serde_json::Map<String, Value> =
+                variant.features.iter().map(|(name, value)| ((*name).into(), json!(value))).collect();
+            variants.push(
+                json!({"kernel": variant.kernel, "voxel": variant.voxel.map(|v| format!("{v:?}").to_lowercase()),
+                "features": features, "at_start": i < source.common, "options": variant.options(used.lanes, false)}),
+            );
+        }
+    }
+    let text =
+        serde_json::to_string_pretty(&json!({"count": variants.len(), "lanes": used.lanes, "variants": variants}));
+    println!("{}", text.map_err(Error::internal)?);
     Ok(())
 }

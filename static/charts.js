@@ -64,7 +64,7 @@ hooks.askToken = () => Promise.reject(new Problem(401, { title: 'A bearer token 
 
 try {
   const { studies, stability } = await json('v1/studies');
-  const machine = (studies[0] ?? stability)?.machine;
+  const machine = (studies[0] ?? stability?.experiments[0])?.machine;
   if (machine) byId('device').textContent = `measured on ${machine.processor}, ${machine.threads} threads, ${machine.device}; ${machine.commit}`;
   showCases(studies);
   if (stability) showStability(stability);

@@ -91,6 +91,45 @@ fn every_variant_builds_with_warnings_as_errors() {
     }
 }
 
+/// The program of a variant as its compiler sees it, after the preprocessor.
+fn preprocessed(source: &Source, variant: &Variant) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("program.c");
+    std::fs::write(&file, source.text(None).unwrap()).unwrap();
+    let options = variant.options(16, false);
+    let defines = options.split_whitespace().filter(|o| o.starts_with("-D"));
+    let output = Command::new("gcc").args(["-E", "-P"]).args(defines).arg(&file).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[test]
+fn what_a_variant_does_without_is_not_in_its_program() {
+    let source = (technique::find("emission_absorption").unwrap().source)();
+    for variant in (source.variants)() {
+        let text = preprocessed(&source, &variant);
+        for (feature, code) in [("SHADED", "Real3 lit("), ("STYLED", "styled_step("), ("PREINTEGRATED", "integral(")] {
+            let wanted = variant.features.contains(&(feature, 1));
+            assert_eq!(text.contains(code), wanted, "{}: {code}", variant.label());
+        }
+    }
+}
+
+#[test]
+fn no_two_variants_are_the_same_program() {
+    for t in technique::ALL {
+        let source = (t.source)();
+        let mut seen: Vec<(String, String)> = Vec::new();
+        for variant in (source.variants)() {
+            let text = preprocessed(&source, &variant);
+            if let Some((other, _)) = seen.iter().find(|(_, known)| *known == text) {
+                panic!("{} is the same program as {other}", variant.label());
+            }
+            seen.push((variant.label(), text));
+        }
+    }
+}
+
 #[test]
 fn a_warning_fails_the_build() {
     let folder = tempfile::tempdir().unwrap();

@@ -41,9 +41,9 @@ fn describe_stability(found: &Stability) -> Value {
         let charts: Vec<String> = [format!("{ROOT}/stability_{}.svg", outcome.name)].into_iter().chain(map).collect();
         let codes: std::collections::BTreeSet<&String> = outcome.findings.samples().flat_map(|(_, s)| &s.warnings).collect();
         json!({"name": outcome.name, "title": outcome.title, "expected": outcome.expected, "verdict": outcome.verdict.words(),
-            "warnings": codes, "charts": charts})
+            "warnings": codes, "quick": outcome.quick, "machine": outcome.machine, "charts": charts})
     });
-    json!({"href": format!("{ROOT}/{STABILITY}"), "quick": found.quick, "machine": found.machine,
+    json!({"href": format!("{ROOT}/{STABILITY}"),
         "experiments": experiments.collect::<Vec<_>>(), "not_here_yet": found.not_here_yet})
 }
 

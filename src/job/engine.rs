@@ -156,9 +156,17 @@ impl Engine {
     }
 
     /// The same with what the planner said of it.
-    pub fn submit_planned(&self, mut place: Place, request: Value, scene: Scene, planned: Option<Value>) -> Arc<Job> {
+    pub fn submit_planned(&self, place: Place, request: Value, scene: Scene, planned: Option<Value>) -> Arc<Job> {
+        self.start_job(place, Job::new(request, scene, planned, false))
+    }
+
+    /// Queues a render that nobody sees but the caller: it is not listed, and forgotten when it ends.
+    pub fn submit_pilot(&self, place: Place, request: Value, scene: Scene) -> Arc<Job> {
+        self.start_job(place, Job::new(request, scene, None, true))
+    }
+
+    fn start_job(&self, mut place: Place, job: Arc<Job>) -> Arc<Job> {
         place.taken = true;
-        let job = Job::new(request, scene, planned);
         self.jobs().by_id.insert(job.id().to_owned(), job.clone());
         self.inner.runtime.spawn(develop::frames(Arc::downgrade(&job), self.clone()));
         self.run(&job);
@@ -207,22 +215,14 @@ impl Engine {
         job.cancel();
     }
 
-    /// Forgets an ended render, or one that nobody waits for.
-    pub fn forget(&self, job: &Arc<Job>) {
-        job.cancel();
-        let mut jobs = self.jobs();
-        jobs.by_id.remove(job.id());
-        jobs.ended.retain(|id| id != job.id());
-    }
-
     /// The render of an id.
     pub fn job(&self, id: &str) -> Option<Arc<Job>> {
-        self.jobs().by_id.get(id).cloned()
+        self.jobs().by_id.get(id).filter(|j| !j.is_pilot()).cloned()
     }
 
     /// Every render that is kept, newest first.
     pub fn list(&self) -> Vec<Arc<Job>> {
-        let mut all: Vec<_> = self.jobs().by_id.values().cloned().collect();
+        let mut all: Vec<_> = self.jobs().by_id.values().filter(|j| !j.is_pilot()).cloned().collect();
         all.sort_by_key(|j| std::cmp::Reverse((j.created_unix_s, j.lock().asked)));
         all
     }
@@ -233,9 +233,12 @@ impl Engine {
         metrics::counter!("cloudchamber_renders_ended_total", "state" => format!("{:?}", job.state()).to_lowercase())
             .increment(1);
         let mut jobs = self.jobs();
+        if job.is_pilot() {
+            jobs.by_id.remove(job.id());
+            return;
+        }
         // It may run again by now, or have ended twice.
-        if job.state().is_terminal() && jobs.by_id.contains_key(job.id()) && !jobs.ended.iter().any(|id| id == job.id())
-        {
+        if job.state().is_terminal() && !jobs.ended.iter().any(|id| id == job.id()) {
             jobs.ended.push_back(job.id().to_owned());
         }
         // The newest keeps its film however large, for whoever waits for it.
@@ -264,7 +267,8 @@ impl Engine {
         while self.unfinished() > 0 && tokio::time::Instant::now() < deadline {
             tokio::time::sleep(Duration::from_millis(20)).await;
         }
-        for job in self.list() {
+        let all: Vec<_> = self.jobs().by_id.values().cloned().collect();
+        for job in all {
             self.cancel(&job);
         }
     }

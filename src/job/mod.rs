@@ -114,6 +114,8 @@ pub struct Job {
     request: Value,
     /// What the planner said of it, where it chose it.
     planned: Option<Value>,
+    /// A planner's: seen by nobody else.
+    pilot: bool,
     created_unix_s: u64,
     cancelled: AtomicBool,
     /// Set while a snapshot is being developed: the device thread skips snapshots that nobody could use.
@@ -124,7 +126,7 @@ pub struct Job {
 }
 
 impl Job {
-    pub(crate) fn new(request: Value, scene: Scene, planned: Option<Value>) -> Arc<Self> {
+    pub(crate) fn new(request: Value, scene: Scene, planned: Option<Value>, pilot: bool) -> Arc<Self> {
         let progress = Progress {
             state: State::Queued,
             generation: 0,
@@ -150,6 +152,7 @@ impl Job {
             id: uuid::Uuid::new_v4().simple().to_string(),
             request,
             planned,
+            pilot,
             created_unix_s: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs()),
             cancelled: AtomicBool::new(false),
             developing: AtomicBool::new(false),
@@ -157,6 +160,10 @@ impl Job {
             updates: watch::Sender::new(Update { state: State::Queued, frame: None }),
             snapshots: watch::Sender::new(None),
         })
+    }
+
+    pub(crate) fn is_pilot(&self) -> bool {
+        self.pilot
     }
 
     /// The render's id.

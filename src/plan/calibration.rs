@@ -92,7 +92,9 @@ impl Calibrations {
         }
         let found = Calibration { of, factors };
         // What cannot be kept is measured again next time.
-        if let Err(error) = serde_json::to_vec_pretty(&found).map(|text| std::fs::write(&self.file, text)) {
+        if let Err(error) =
+            serde_json::to_vec_pretty(&found).map_err(std::io::Error::from).and_then(|t| std::fs::write(&self.file, t))
+        {
             tracing::warn!(%error, "the calibration is not kept");
         }
         Ok(found)

@@ -87,6 +87,14 @@ pub fn with_technique(body: &Value, technique: &str) -> Value {
     request
 }
 
+/// The setting that stands for the truth of the others.
+pub fn reference(body: &Value, family: Family) -> Candidate {
+    match family {
+        Family::Stepping(name) => stepping(body, name).swap_remove(0),
+        Family::Scattering => every_path(body),
+    }
+}
+
 /// The candidates, the first of which is the reference, and those that a bound rules out.
 pub fn candidates(body: &Value, family: Family, features: &Features, error: f64) -> (Vec<Candidate>, Vec<Considered>) {
     match family {
@@ -130,15 +138,45 @@ fn stepping(body: &Value, name: &str) -> Vec<Candidate> {
     all
 }
 
+/// What is given of either of the scattering views; named, a view has only its own.
+fn scattering_own(body: &Value) -> Map<String, Value> {
+    match body["technique"].as_str() {
+        Some(name @ ("volume_path" | "single_scatter")) => given(body, name),
+        _ => {
+            let mut own = given(body, "volume_path");
+            own.extend(given(body, "single_scatter"));
+            own
+        }
+    }
+}
+
+/// All paths, or where single scattering is what is asked for, all that are scattered once.
+fn every_path(body: &Value) -> Candidate {
+    let own = Value::Object(scattering_own(body));
+    match body["technique"].as_str() {
+        Some("single_scatter") => Candidate {
+            technique: "single_scatter".into(),
+            own,
+            words: "single_scatter, as asked".into(),
+            unbiased: true,
+        },
+        _ => Candidate {
+            technique: "volume_path".into(),
+            own,
+            words: "volume_path, every scattering".into(),
+            unbiased: true,
+        },
+    }
+}
+
 fn scattering(body: &Value, features: &Features, error: f64) -> (Vec<Candidate>, Vec<Considered>) {
-    let mut own = given(body, "volume_path");
-    own.extend(given(body, "single_scatter"));
-    let of = |technique: &str, more: &[(&str, Value)], words: String, unbiased: bool| {
+    let own = scattering_own(body);
+    let of = |technique: &str, more: &[(&str, Value)], words: String| {
         let mut own = own.clone();
         own.extend(more.iter().map(|(k, v)| ((*k).to_owned(), v.clone())));
-        Candidate { technique: technique.into(), own: Value::Object(own), words, unbiased }
+        Candidate { technique: technique.into(), own: Value::Object(own), words, unbiased: false }
     };
-    let mut all = vec![of("volume_path", &[], "volume_path, every scattering".into(), true)];
+    let mut all = vec![every_path(body)];
     let mut ruled_out = Vec::new();
     let free = super::is_auto(body) && !own.contains_key("max_scatterings") && features.albedo != Some(0.0);
     for scatterings in SCATTERINGS.into_iter().filter(|_| free) {
@@ -162,7 +200,7 @@ fn scattering(body: &Value, features: &Features, error: f64) -> (Vec<Candidate>,
         }
         let limit = [("max_scatterings", json!(scatterings))];
         let more = if scatterings == 1 { &[][..] } else { &limit[..] };
-        all.push(of(technique, more, words, false));
+        all.push(of(technique, more, words));
     }
     (all, ruled_out)
 }

@@ -67,7 +67,7 @@ impl Pilot {
         let enough = |n: u32| self.noise_after(f64::from(n)).powi(2) <= room;
         // Evenly spread places are looked at where their curve is: one at the pixel's middle can be better than a few at other places.
         if !self.is_random() {
-            return (0..).map(|i| 4u32.saturating_pow(i)).take_while(|n| *n <= most).find(|n| room > 0.0 && enough(*n));
+            return (0..16).map(|i| 4u32.pow(i)).find(|n| room > 0.0 && *n <= most && enough(*n));
         }
         (room > 0.0 && enough(most)).then(|| {
             let (mut low, mut high) = (0, most);
@@ -120,7 +120,13 @@ pub(super) fn choose_among(
     let samples = plan_of(best).or_else(|| in_time(best)).unwrap_or(most);
     let n = f64::from(samples);
     let (time, error) = (cost(best, samples), best.error_after(n));
-    let considered = pilots.iter().map(|p| considered(p, for_error(p).map(|n| (n, cost(p, n))), wish)).collect();
+    let considered = pilots
+        .iter()
+        .map(|p| {
+            let samples = if wish.says_error { for_error(p) } else { in_time(p) };
+            considered(p, samples.map(|n| (n, cost(p, n))), wish)
+        })
+        .collect();
     Chosen {
         index,
         samples,
@@ -136,22 +142,24 @@ fn percent(v: f64) -> String {
     format!("{:.2} %", 100.0 * v)
 }
 
-fn considered(p: &Pilot, enough: Option<(u32, f64)>, wish: Wish) -> Considered {
+/// `needed` are the samples for the error asked for, or that fit into the time where only that was asked for, and their time.
+fn considered(p: &Pilot, needed: Option<(u32, f64)>, wish: Wish) -> Considered {
     let bias = p.bias + p.bias_within;
-    let samples = enough.map(|e| e.0);
-    let why = match samples {
-        Some(n) => format!("{n} samples bring it to {}", percent(p.error_after(f64::from(n)))),
+    let late = |ms: f64| wish.time_ms.filter(|t| wish.says_error && ms > *t);
+    let why = match needed {
+        Some((n, ms)) if late(ms).is_some() => format!("{n} samples would bring it there, but in about {ms:.0} ms"),
+        Some((n, _)) => format!("{n} samples bring it to {}", percent(p.error_after(f64::from(n)))),
         None if bias >= AIM * wish.error => format!("wrong by up to {} however many samples it takes", percent(bias)),
         None => "more samples than are permitted would be needed".into(),
     };
     Considered {
         words: p.candidate.words.clone(),
         technique: p.candidate.technique.clone(),
-        samples,
-        device_ms: enough.map(|e| e.1),
-        error: samples.map(|n| p.error_after(f64::from(n))),
+        samples: needed.map(|e| e.0),
+        device_ms: needed.map(|e| e.1),
+        error: needed.map(|(n, _)| p.error_after(f64::from(n))),
         bias: Some(p.bias),
-        enough: samples.is_some(),
+        enough: needed.is_some_and(|(_, ms)| late(ms).is_none()),
         why,
     }
 }

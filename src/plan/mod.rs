@@ -106,13 +106,12 @@ impl Planner<'_> {
             return Err(Error::invalid("", "not an object", "a JSON object such as a render's"));
         }
         let family = Family::of(body);
-        let base = candidates::with_technique(body, family.technique());
-        let scene = self.scene(&base)?;
+        let scene = self.reference(body, family)?;
         let Subject::Volume(volume) = scene.subject() else {
             let permitted = "a volume that is there; fetch the field and upload it";
             return Err(Error::invalid("/volume", "a plan needs to see the volume", permitted));
         };
-        let features = Features::of(&scene, volume, &base);
+        let features = Features::of(&scene, volume, &candidates::reference(body, family).request(body));
         let wish = Wish::of(&scene);
         let (candidates, mut considered) = candidates::candidates(body, family, &features, wish.error);
         let possible: Vec<Candidate> =
@@ -120,7 +119,8 @@ impl Planner<'_> {
         let mut pilots = pilot::run_all(self, body, scene.image(), &possible).await?;
         let calibration = self.calibrations.of(self).await?;
         let image = scene.image();
-        let most = self.limits.max_samples;
+        let asked = body.pointer("/budget/samples").and_then(Value::as_u64).map_or(u32::MAX, |n| n as u32);
+        let most = self.limits.max_samples.min(asked);
         let mut chosen = choose::choose(&pilots, wish, image, &calibration, most);
         if chosen.samples > pilot::CONFIRMED {
             let likely = &pilots[chosen.index];
@@ -154,10 +154,9 @@ impl Planner<'_> {
     /// Those of the request.
     pub fn settings(&self, body: &Value) -> Result<Vec<(String, Value)>> {
         let family = Family::of(body);
-        let base = candidates::with_technique(body, family.technique());
-        let scene = self.scene(&base)?;
+        let scene = self.reference(body, family)?;
         let Subject::Volume(volume) = scene.subject() else { return Ok(Vec::new()) };
-        let features = Features::of(&scene, volume, &base);
+        let features = Features::of(&scene, volume, &candidates::reference(body, family).request(body));
         let (candidates, _) = candidates::candidates(body, family, &features, f64::INFINITY);
         let requests = candidates.into_iter().map(|c| (c.words.clone(), c.request(body)));
         Ok(requests.filter(|(_, request)| self.scene(request).is_ok()).collect())
@@ -178,6 +177,17 @@ impl Planner<'_> {
             words.retain(|name, _| name != "request");
         }
         Ok((request, Some(words)))
+    }
+
+    /// The scene of the reference, after the request has been looked at as it came.
+    fn reference(&self, body: &Value, family: Family) -> Result<Scene> {
+        let as_it_came = match &body["technique"] {
+            Value::Null => candidates::with_technique(body, family.technique()),
+            _ if is_auto(body) => candidates::with_technique(body, family.technique()),
+            _ => body.clone(),
+        };
+        self.scene(&as_it_came)?;
+        self.scene(&candidates::reference(body, family).request(body))
     }
 
     fn scene(&self, request: &Value) -> Result<Scene> {

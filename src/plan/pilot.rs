@@ -5,12 +5,15 @@
 //! by the first few of the picture itself. Of steps along a ray, whose places are far better spread than the random ones that the film takes
 //! them for, it is the difference to the shortest step, for one sample a pixel and for more.
 
+use std::sync::Arc;
+
 use serde_json::{Value, json};
 
 use super::Planner;
 use super::candidates::Candidate;
 use crate::error::{Error, Result};
-use crate::job::State;
+use crate::film::{ErrorEstimate, Film};
+use crate::job::{Engine, Job, State};
 
 /// Pixels of a pilot.
 const PIXELS: f64 = 4096.0;
@@ -53,17 +56,26 @@ pub fn size(image: [u32; 2]) -> [u32; 2] {
     image.map(|side| ((f64::from(side) * scale).round() as u32).max(1))
 }
 
-/// Runs a request to its end and forgets it.
-pub async fn finish(
-    planner: &Planner<'_>,
-    request: Value,
-) -> Result<(std::sync::Arc<crate::film::Film>, crate::film::ErrorEstimate, f64)> {
+/// A pilot that is not waited for any more, as when a client goes away, is cancelled.
+struct CancelOnDrop<'a> {
+    engine: &'a Engine,
+    job: Arc<Job>,
+}
+
+impl Drop for CancelOnDrop<'_> {
+    fn drop(&mut self) {
+        self.engine.cancel(&self.job);
+    }
+}
+
+/// Runs a request to its end, unseen.
+pub async fn finish(planner: &Planner<'_>, request: Value) -> Result<(Arc<Film>, ErrorEstimate, f64)> {
     let place = planner.engine.reserve()?;
     let scene = planner.scene(&request)?;
-    let job = planner.engine.submit(place, request, scene);
+    let job = CancelOnDrop { engine: planner.engine, job: planner.engine.submit_pilot(place, request, scene) };
+    let job = &job.job;
     let ended = job.watch().wait_for(|u| u.state.is_terminal()).await.map(drop).map_err(Error::internal);
     let (state, film, resource) = (job.state(), job.film(), job.resource());
-    planner.engine.forget(&job);
     ended?;
     match (state, film) {
         (State::Done, Some((film, error))) => {
@@ -83,7 +95,7 @@ async fn run(
 ) -> Result<Run> {
     let mut request = candidate.request(body);
     request["image"] = json!({"width": width, "height": height});
-    request["budget"] = json!({"samples": samples});
+    request["budget"] = json!({"samples": samples.min(planner.limits.max_samples)});
     request["seed"] = json!(seed);
     let (film, error, device_ms) = finish(planner, request).await?;
     let luminance: Vec<f64> = (0..film.main.pixels()).map(|i| film.main.luminance(i)).collect();
@@ -150,9 +162,13 @@ fn lasting(runs: &[Run; 2], references: [&Run; 2], scale: f64) -> (f64, f64) {
     let difference = |k: usize, i: usize| (runs[k].luminance[i] - references[k].luminance[i]) / scale;
     let pixels = runs[0].luminance.len();
     let products: Vec<f64> = (0..pixels).map(|i| difference(0, i) * difference(1, i)).collect();
-    let groups: Vec<f64> = (0..GROUPS).map(|g| mean(products.iter().skip(g).step_by(GROUPS).copied())).collect();
+    let count = GROUPS.min(pixels);
+    let groups: Vec<f64> = (0..count).map(|g| mean(products.iter().skip(g).step_by(count).copied())).collect();
     let middle = mean(groups.iter().copied());
-    let spread = (mean(groups.iter().map(|g| (g - middle).powi(2))) / (GROUPS - 1) as f64).sqrt();
+    let spread = match count {
+        0 | 1 => middle.abs(),
+        n => (mean(groups.iter().map(|g| (g - middle).powi(2))) / (n - 1) as f64).sqrt(),
+    };
     let bias = middle.max(0.0).sqrt();
     (bias, (middle.max(0.0) + 2.0 * spread).sqrt() - bias)
 }

@@ -22,6 +22,10 @@ pub struct Outcome {
     pub verdict: Verdict,
     /// Places that are not what a closed form says, in words.
     pub surprises: Vec<String>,
+    /// Whether it is the short form.
+    pub quick: bool,
+    /// Where it was measured.
+    pub machine: Machine,
     /// What was measured.
     pub findings: Findings,
 }
@@ -29,10 +33,6 @@ pub struct Outcome {
 /// What came of all of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Stability {
-    /// Whether it is the short form.
-    pub quick: bool,
-    /// Where it was measured.
-    pub machine: Machine,
     /// One by one.
     pub experiments: Vec<Outcome>,
     /// What fails elsewhere and whose technique is not here yet, and that technique.
@@ -44,13 +44,16 @@ pub struct Stability {
 /// # Errors
 /// Those of its requests.
 pub fn outcome(bench: &Bench, experiment: &Experiment, scale: Scale) -> Result<Outcome> {
-    let findings = (experiment.run)(bench, scale)?;
+    let mut findings = (experiment.run)(bench, scale)?;
+    findings.keep_codes(experiment.codes);
     Ok(Outcome {
         name: experiment.name.into(),
         title: experiment.title.into(),
         expected: experiment.expected.into(),
         verdict: findings.verdict(),
         surprises: findings.surprises(),
+        quick: scale == Scale::Quick,
+        machine: machine(bench),
         findings,
     })
 }
@@ -74,22 +77,17 @@ pub fn stability(
         experiments.push(outcome);
     }
     let not_here_yet = NOT_HERE_YET.iter().map(|row| row.map(str::to_owned)).collect();
-    Ok(Stability { quick: scale == Scale::Quick, machine: machine(bench), experiments, not_here_yet })
+    Ok(Stability { experiments, not_here_yet })
 }
 
 impl Stability {
     /// The page in Markdown; charts lie beside it.
     pub fn page(&self) -> String {
         let mut text = format!(
-            "# Where methods fail\n\nEach experiment takes a method out of its domain and looks at what it says of itself there. \
-            `{}` would fail the build: it never stands here. The codes are those of the `warnings` of an ordinary render. Measured on {}, \
-            {} threads, {}; version {} ({}). `./dev study --case stability` makes this page.\n\n",
-            Verdict::BiasedAndSilent.words(),
-            self.machine.processor,
-            self.machine.threads,
-            self.machine.platform,
-            self.machine.version,
-            self.machine.commit
+            "# Where methods fail\n\nEach experiment takes a method out of its domain and looks at what it says of itself there. `{}` \
+            fails the build. The codes are those of the `warnings` of an ordinary render. `./dev study --case stability` makes this \
+            page.\n\n",
+            Verdict::BiasedAndSilent.words()
         );
         text += "| experiment | expected | verdict |\n|---|---|---|\n";
         for outcome in &self.experiments {
@@ -127,6 +125,12 @@ impl Outcome {
             text += &row(&format!("{} (map)", map.title), worst, &samples);
             text += &format!("\n![{}](stability_{name}_map.svg)\n", map.title);
         }
+        let m = &self.machine;
+        let quick = if self.quick { ", the quick form" } else { "" };
+        text += &format!(
+            "\nMeasured on {}, {} threads, {}; version {} ({}){quick}.\n",
+            m.processor, m.threads, m.platform, m.version, m.commit
+        );
         for surprise in &self.surprises {
             text += &format!("\nNot as predicted: {surprise}.\n");
         }

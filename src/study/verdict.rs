@@ -117,6 +117,8 @@ pub struct HeatMap {
     pub across: Vec<f64>,
     /// See `across`.
     pub up: Vec<f64>,
+    /// What a prediction may be off by, relative.
+    pub tolerance: f64,
     /// The samples: a row for each of `up`, from the first.
     pub samples: Vec<Vec<Sample>>,
 }
@@ -157,7 +159,21 @@ impl Findings {
             })
             .collect::<Vec<_>>()
         };
-        self.sweeps.iter().flat_map(of).collect()
+        let mapped = self.heat_map.iter().flat_map(|map| {
+            map.samples.iter().enumerate().map(|(row, samples)| Sweep {
+                method: format!("{}, {} {}", map.title, map.axes[1], map.up[row]),
+                tolerance: map.tolerance,
+                samples: samples.clone(),
+            })
+        });
+        self.sweeps.iter().cloned().chain(mapped).flat_map(|sweep| of(&sweep)).collect()
+    }
+
+    /// Leaves of the warnings those that tell of what is looked at.
+    pub fn keep_codes(&mut self, codes: &[&str]) {
+        let mapped = self.heat_map.iter_mut().flat_map(|map| map.samples.iter_mut().flatten());
+        let swept = self.sweeps.iter_mut().flat_map(|sweep| &mut sweep.samples);
+        swept.chain(mapped).for_each(|sample| sample.warnings.retain(|w| codes.contains(&w.as_str())));
     }
 }
 

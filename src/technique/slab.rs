@@ -6,6 +6,8 @@ const MOST_TERMS: u32 = 10_000;
 /// Of [`missing`]: cells, and the optical depth that stands for deeper ones.
 const COARSE_CELLS: usize = 64;
 const DEEPEST: f64 = 12.0;
+/// Of less nothing is missed that matters, and differences of E₃ lose their digits.
+const THINNEST: f64 = 1e-6;
 
 /// The exponential integral E₂(x) = ∫₁^∞ e^(−xt)/t² dt, x ≥ 0: Gauss-Legendre over u = 1/t of e^(−x/u), in pieces towards 0.
 fn e2(x: f64) -> f64 {
@@ -72,7 +74,7 @@ pub fn reflected(depth: f64, albedo: f64, scatterings: Option<u32>, cells: usize
 
 /// The part of a slab's reflectance that was scattered more than `scatterings` times, to a few thousandths.
 pub fn missing(depth: f64, albedo: f64, scatterings: u32) -> f64 {
-    if depth <= 0.0 || albedo <= 0.0 {
+    if depth < THINNEST || albedo <= 0.0 {
         return 0.0;
     }
     // Deeper ones hardly differ: what comes back has hardly been there.

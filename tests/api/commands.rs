@@ -105,3 +105,21 @@ async fn healthcheck_exits_by_the_servers_health() {
     assert_eq!(server.wait(), Some(0));
     fails(&check(), &address);
 }
+
+#[test]
+fn device_lists_the_variants_of_every_kernel() {
+    let folder = tempfile::tempdir().unwrap();
+    let told: Value = serde_json::from_str(&succeeds(&cloudchamber(folder.path(), &["device", "--variants"]))).unwrap();
+    let variants = told["variants"].as_array().unwrap();
+    assert_eq!(told["count"].as_u64(), Some(variants.len() as u64));
+    for kernel in ["emission_absorption", "volume_path", "photon_transport", "isosurface"] {
+        let of: Vec<&Value> = variants.iter().filter(|v| v["kernel"] == kernel).collect();
+        assert!(
+            of.iter().any(|v| v["at_start"] == true) && of[0]["options"].as_str().unwrap().contains("-Werror"),
+            "{kernel}"
+        );
+    }
+    assert!(
+        variants.iter().any(|v| v["features"]["SHADED"] == 1) && variants.iter().any(|v| v["features"]["SHADED"] == 0)
+    );
+}

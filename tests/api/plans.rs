@@ -1,7 +1,11 @@
 //! `POST /v1/plan`, and renders whose technique is `auto`.
 
+use std::time::{Duration, Instant};
+
+use reqwest::Method;
 use serde_json::{Value, json};
 
+use super::common::Server;
 use super::support::*;
 
 async fn plan(api: &Api, body: &Value) -> Value {
@@ -108,5 +112,42 @@ async fn what_cannot_be_planned_names_its_field() {
             names(&told, pointer, &format!("{path}: {body}"));
         }
     }
-    problem(api.post_to("/v1/plan", &json!([1])).await, 422, "not an object").await;
+    for body in [
+        json!([1]),
+        json!({"technique": "nonsense"}),
+        json!({"technique": 5}),
+        json!({"technique": "photon_transport"}),
+    ] {
+        problem(api.post_to("/v1/plan", &body).await, 422, &body.to_string()).await;
+    }
+    let twice = json!({"technique": "auto", "medium": {"albedo": 0.5}, "single_scatter": {"medium": {"albedo": 0.5}}});
+    problem(api.post_to("/v1/plan", &twice).await, 422, "a medium in two places").await;
+}
+
+#[tokio::test]
+async fn what_is_said_is_kept() {
+    let server = shared();
+    let api = Api::new(&server);
+    let mut body = fog(5.0, 0.9, &json!({"max_error": 0.001, "samples": 5}));
+    assert!(plan(&api, &body).await["samples"].as_u64().unwrap() <= 5, "no more samples than are asked for");
+    body["technique"] = json!("single_scatter");
+    assert_eq!(plan(&api, &body).await["technique"], "single_scatter", "a technique that is named is kept");
+    let step =
+        json!({"technique": "auto", "image": {"width": 64, "height": 48}, "emission_absorption": {"step_voxels": 0.7}});
+    assert_eq!(plan(&api, &step).await["options"]["step_voxels"], 0.7);
+}
+
+#[tokio::test]
+async fn a_client_that_goes_away_takes_its_pilots_along() {
+    let server = Server::start();
+    let api = Api::new(&server);
+    let large = json!({"technique": "auto", "image": {"width": 3000, "height": 3000}, "medium": {}, "budget": {"max_error": 0.001}});
+    let request = api.request(Method::POST, "/v1/plan").json(&large).timeout(Duration::from_secs(4));
+    assert!(request.send().await.is_err(), "its last pilot alone takes longer");
+    let started = Instant::now();
+    while !api.get("/metrics").await.text().await.unwrap().contains("cloudchamber_renders_unfinished 0") {
+        assert!(started.elapsed() < Duration::from_secs(5), "a pilot goes on for nobody");
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+    assert_eq!(api.get_json("/v1/renders").await["renders"], json!([]));
 }

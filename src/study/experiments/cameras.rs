@@ -15,6 +15,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "cameras",
     title: "Cameras in odd places: 1 oblique, 2 along an axis, 3 within, 4 within along an axis, 5 on a face, 6 on a face outwards, \
         7 behind, 8 along a diagonal, 9 a million units away along an axis, 10 a million units away, oblique",
+    codes: &[],
     expected: "finite, right or empty, never garbage",
     run,
 };

@@ -14,6 +14,7 @@ use crate::study::verdict::{Findings, Sweep};
 pub const EXPERIMENT: Experiment = Experiment {
     name: "constant_grid",
     title: "A box of one medium against a constant grid",
+    codes: &[],
     expected: "equal within noise",
     run,
 };

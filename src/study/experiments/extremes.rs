@@ -13,6 +13,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     name: "extremes",
     title: "The ends of what is permitted: 1 no absorption, 2 no scattering, 3 nothing at all, 4 g = 0.999, 5 g = −0.999, 6 g = 0, \
         7 albedo 1 at depth 200, 8 index 3, 9 a start on a face, 10 on an edge, 11 in a corner, 12 along an axis on a wall between voxels",
+    codes: &[],
     expected: "finite, the energy ledger closes to 1e-6",
     run,
 };

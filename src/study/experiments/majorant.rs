@@ -12,6 +12,7 @@ use crate::study::verdict::{Findings, HeatMap, Sweep};
 pub const EXPERIMENT: Experiment = Experiment {
     name: "majorant",
     title: "A majorant below or above the extinction",
+    codes: &["broken_majorant"],
     expected: "below 1 biased and flagged; above 1 unbiased, at a rising cost",
     run,
 };
@@ -66,6 +67,7 @@ fn contrast(bench: &Bench, count: u32) -> Result<HeatMap> {
     }
     Ok(HeatMap {
         title: "Delta tracking's transmittance".into(),
+        tolerance: 1e-5,
         axes: ["majorant / greatest extinction".into(), "density contrast".into()],
         across: ratios,
         up: contrasts,

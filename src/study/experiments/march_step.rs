@@ -13,6 +13,7 @@ use crate::study::verdict::{Findings, Sweep};
 pub const EXPERIMENT: Experiment = Experiment {
     name: "march_step",
     title: "The step of a photon march",
+    codes: &["march_bias"],
     expected: "error about linear in the step; exact, delta and weighted tracking flat",
     run,
 };

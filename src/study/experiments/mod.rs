@@ -25,6 +25,8 @@ pub struct Experiment {
     pub name: &'static str,
     /// What is done, in a line.
     pub title: &'static str,
+    /// The warnings that tell of it: others do not count.
+    pub codes: &'static [&'static str],
     /// What a right implementation shows.
     pub expected: &'static str,
     /// Does it.

@@ -13,6 +13,7 @@ use crate::study::{Scale, view};
 pub const EXPERIMENT: Experiment = Experiment {
     name: "opacity_step",
     title: "The step of a composite",
+    codes: &["coarse_step"],
     expected: "in a slab alpha within 1/255 of 1 − e^(−τ) over 16 times the step",
     run,
 };
@@ -68,6 +69,7 @@ fn run(bench: &Bench, _: Scale) -> Result<Findings> {
     };
     let heat_map = HeatMap {
         title: "The opacity of a slab with edges of a voxel".into(),
+        tolerance: 0.0,
         axes: ["step / voxel".into(), "optical depth".into()],
         across: STEPS.into(),
         samples: depths.iter().map(row).collect::<Result<_>>()?,

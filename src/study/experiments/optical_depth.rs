@@ -9,8 +9,13 @@ use crate::study::verdict::{Findings, Sample, Sweep};
 use crate::study::{Scale, view};
 
 /// The experiment's line.
-pub const EXPERIMENT: Experiment =
-    Experiment { name: "optical_depth", title: "Optical depth up to 200", expected: "no NaN, no black pixel", run };
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "optical_depth",
+    title: "Optical depth up to 200",
+    codes: &[],
+    expected: "no NaN, no black pixel",
+    run,
+};
 
 const DEPTHS: [f64; 6] = [1.0, 5.0, 20.0, 60.0, 100.0, 200.0];
 

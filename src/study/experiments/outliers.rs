@@ -14,6 +14,7 @@ use crate::study::verdict::{Findings, Sweep};
 pub const VOXEL: Experiment = Experiment {
     name: "outlier_voxel",
     title: "One voxel of great density",
+    codes: &[],
     expected: "means equal for all trackers; a majorant of the whole is slow, local ones are not",
     run: |b, s| run(b, s, |p, value| if p.abs().max_element() < 0.08 { value } else { 0.3 }),
 };
@@ -21,6 +22,7 @@ pub const VOXEL: Experiment = Experiment {
 pub const SHELL: Experiment = Experiment {
     name: "thin_shell",
     title: "A thin shell of great density in a vacuum",
+    codes: &[],
     expected: "means equal for all trackers; a majorant of the whole is slow, local ones are not",
     run: |b, s| run(b, s, |p, value| if (0.6..0.68).contains(&p.length()) { value } else { 0.0 }),
 };

@@ -12,6 +12,7 @@ use crate::study::verdict::{Findings, Sweep};
 pub const EXPERIMENT: Experiment = Experiment {
     name: "photon_count",
     title: "More photons",
+    codes: &[],
     expected: "the error falls as N^(−1/2) with no floor",
     run,
 };
