@@ -2,7 +2,6 @@
 
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use cloudchamber::client::{self, Client};
@@ -100,18 +99,16 @@ impl RenderArgs {
     }
 }
 
-fn main() -> ExitCode {
+fn main() -> ! {
     let cli = Cli::parse();
     let filter = tracing_subscriber::EnvFilter::try_from_env("CLOUDCHAMBER_LOG")
         .unwrap_or_else(|_| "info,tower_http=warn".into());
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
-    match run(cli.command) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("cloudchamber: {error}");
-            ExitCode::FAILURE
-        }
+    let ended = run(cli.command);
+    if let Err(error) = &ended {
+        eprintln!("cloudchamber: {error}");
     }
+    device::leave(i32::from(ended.is_err()))
 }
 
 fn run(command: Command) -> Result<()> {

@@ -122,10 +122,11 @@ impl Planner<'_> {
         let asked = body.pointer("/budget/samples").and_then(Value::as_u64).map_or(u32::MAX, |n| n as u32);
         let most = self.limits.max_samples.min(asked);
         let mut chosen = choose::choose(&pilots, wish, image, &calibration, most);
-        if chosen.samples > pilot::CONFIRMED {
+        if chosen.enough || wish.time_ms.is_some() {
             let likely = &pilots[chosen.index];
             let besides = calibration.besides(&likely.candidate.technique);
-            pilots[chosen.index] = pilot::confirm(self, body, image, likely, besides).await?;
+            let first = chosen.samples.min(pilot::CONFIRMED);
+            pilots[chosen.index] = pilot::confirm(self, body, image, likely, first, besides).await?;
             let known = Some(chosen.index);
             chosen = choose::choose_among(&pilots, known, wish, image, &calibration, most);
         }

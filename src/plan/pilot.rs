@@ -23,7 +23,7 @@ const SAMPLES: u32 = 16;
 const CURVE: [u32; 3] = [1, 4, 16];
 /// Samples of the view that the curve is compared with.
 const REFERENCE: u32 = 64;
-/// Samples of the whole picture with the chosen setting; a plan of no more is not confirmed.
+/// The most samples of the whole picture with the chosen setting that confirm it.
 pub const CONFIRMED: u32 = 4;
 /// Groups of pixels of which the spread tells how well a bias is known.
 const GROUPS: usize = 16;
@@ -241,12 +241,15 @@ pub async fn confirm(
     body: &Value,
     image: [u32; 2],
     pilot: &Pilot,
+    first: u32,
     besides: f64,
 ) -> Result<Pilot> {
-    let run = run(planner, body, &pilot.candidate, image, CONFIRMED, 1).await?;
+    let run = run(planner, body, &pilot.candidate, image, first, 1).await?;
     let scale = mean(run.luminance.iter().copied()).abs().max(f64::MIN_POSITIVE);
-    let samples = f64::from(CONFIRMED);
-    let noise = if pilot.is_random() { vec![(CONFIRMED, run.noise / scale)] } else { pilot.noise.clone() };
+    let samples = f64::from(first);
+    // Of fewer samples the film knows its noise less well than the pilot.
+    let better = pilot.is_random() && first == CONFIRMED;
+    let noise = if better { vec![(first, run.noise / scale)] } else { pilot.noise.clone() };
     Ok(Pilot { noise, ms_per_sample: run.ms_per_sample * samples / (samples + besides), ..pilot.clone() })
 }
 
