@@ -61,6 +61,7 @@ use crate::volume::{NewVolume, Store, Volume, Voxels};
 pub use device::{FieldPass, PhotonTransport};
 use geometry::Geometry;
 use parameters::Parameters;
+pub use report::FRACTIONS;
 use report::Ledgers;
 use tracking::Tracking;
 

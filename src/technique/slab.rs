@@ -5,6 +5,7 @@
 const MOST_TERMS: u32 = 10_000;
 /// Of [`missing`]: cells, and the optical depth that stands for deeper ones.
 const COARSE_CELLS: usize = 64;
+const COARSE_CHANGE: f64 = 1e-5;
 const DEEPEST: f64 = 12.0;
 /// Of less nothing is missed that matters, and differences of E₃ lose their digits.
 const THINNEST: f64 = 1e-6;
@@ -43,6 +44,11 @@ pub struct Reflected {
 /// Solves S(τ) = ω/4π e^(−τ) + ω/2 ∫ S(t) E₁(|τ − t|) dt in `cells` cells, where ∫ E₁ over a cell is a difference of E₂, by Neumann's
 /// series (a term is a scattering); then R = 2π ∫ S E₂ dτ and L = ∫ S e^(−τ) dτ.
 pub fn reflected(depth: f64, albedo: f64, scatterings: Option<u32>, cells: usize) -> Reflected {
+    solve(depth, albedo, scatterings, cells, 1e-9)
+}
+
+/// The same with the relative change at which the series ends.
+fn solve(depth: f64, albedo: f64, scatterings: Option<u32>, cells: usize, change_at_end: f64) -> Reflected {
     let h = depth / cells as f64;
     let thirds: Vec<f64> = (0..=cells).map(|i| e3(i as f64 * h)).collect();
     // The mean over a cell of the integral of E₁ over the cell that is k away.
@@ -60,7 +66,7 @@ pub fn reflected(depth: f64, albedo: f64, scatterings: Option<u32>, cells: usize
         let next: Vec<f64> = (0..cells).map(|i| first[i] + 0.5 * albedo * lit(i)).collect();
         let change = next.iter().zip(&source).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         source = next;
-        if change < 1e-9 * source[0] {
+        if change < change_at_end * source[0] {
             break;
         }
     }
@@ -79,7 +85,7 @@ pub fn missing(depth: f64, albedo: f64, scatterings: u32) -> f64 {
     }
     // Deeper ones hardly differ: what comes back has hardly been there.
     let depth = depth.min(DEEPEST);
-    let of = |scatterings| reflected(depth, albedo.min(1.0), scatterings, COARSE_CELLS).reflectance;
+    let of = |scatterings| solve(depth, albedo.min(1.0), scatterings, COARSE_CELLS, COARSE_CHANGE).reflectance;
     (1.0 - of(Some(scatterings)) / of(None)).max(0.0)
 }
 

@@ -7,6 +7,7 @@ use crate::error::Result;
 use crate::study::bench::{Bench, Reads};
 use crate::study::oracle::{Grid, Medium, means};
 use crate::study::{Case, Scale, Setting, Trial, Truth, simulation};
+use crate::technique::photon_transport::FRACTIONS;
 use crate::volume::builtin::chamber_value;
 
 /// The case's line.
@@ -18,8 +19,8 @@ pub const CASE: Case = Case {
     trial,
 };
 
-const NAMES: &[&str] =
-    &["exit_minus_x", "exit_plus_x", "exit_minus_y", "exit_plus_y", "exit_minus_z", "exit_plus_z", "absorbed"];
+/// The six faces, and what is absorbed.
+const NAMES: &[&str] = FRACTIONS.split_at(7).0;
 const ALBEDO: f64 = 0.9;
 const GRID: usize = 32;
 

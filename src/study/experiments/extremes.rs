@@ -7,6 +7,7 @@ use crate::error::Result;
 use crate::study::Scale;
 use crate::study::bench::Bench;
 use crate::study::verdict::{Findings, Sweep};
+use crate::technique::photon_transport::FRACTIONS;
 
 /// The experiment's line.
 pub const EXPERIMENT: Experiment = Experiment {
@@ -17,19 +18,6 @@ pub const EXPERIMENT: Experiment = Experiment {
     expected: "finite, the energy ledger closes to 1e-6",
     run,
 };
-
-const ENDS: [&str; 10] = [
-    "specular",
-    "exit_minus_x",
-    "exit_plus_x",
-    "exit_minus_y",
-    "exit_plus_y",
-    "exit_minus_z",
-    "exit_plus_z",
-    "absorbed",
-    "gated",
-    "lost",
-];
 
 fn scenes() -> Vec<Value> {
     let scene = |medium: [f64; 2], g: f64, index: f64, at: [f64; 3], source: &str| {
@@ -65,7 +53,7 @@ fn run(bench: &Bench, scale: Scale) -> Result<Findings> {
             scene["photons"] = json!(count);
             scene["tracking"] = json!(tracking);
             let run = photons(bench, &scene)?;
-            let sum: f64 = ENDS.iter().map(|name| run.fraction(name)[0]).sum();
+            let sum: f64 = FRACTIONS[..10].iter().map(|name| run.fraction(name)[0]).sum();
             let mut sample = sample(&run, (i + 1) as f64, [1e6 * (sum - 1.0).abs(), 0.0], 0.0);
             sample.permitted = 1.0;
             samples.push(sample);

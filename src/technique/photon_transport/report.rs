@@ -5,8 +5,8 @@ use serde_json::{Map, Value, json};
 use super::{FIXED_ONE, LEDGER_BINS, Simulation};
 use crate::technique::majorant::march_bias;
 
-/// The ledger's fractions, in the kernel's order.
-const FRACTIONS: [&str; 12] = [
+/// The ledger's fractions, in the kernel's order: the first ten add up to 1, the last two are parts of exits.
+pub const FRACTIONS: [&str; 12] = [
     "exit_minus_x",
     "exit_plus_x",
     "exit_minus_y",

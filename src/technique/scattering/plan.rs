@@ -131,7 +131,10 @@ impl Scatterer {
         let (Some(followed), medium) = (followed, &self.parameters.medium) else { return 0.0 };
         let density = greatest_along_axes(volume, |v| medium.density_of(v)).into_iter().fold(f64::INFINITY, f64::min);
         let (sigma, albedo) = (medium.sigma_t_per_unit(volume), medium.albedo.rgb());
-        (0..3).map(|c| missing(sigma[c] * density, albedo[c], followed)).fold(0.0, f64::max)
+        let of = |c: usize| missing(sigma[c] * density, albedo[c], followed);
+        // Grey media, which most are, need one of the three.
+        let grey = (1..3).all(|c| sigma[c] == sigma[0] && albedo[c] == albedo[0]);
+        (0..if grey { 1 } else { 3 }).map(of).fold(0.0, f64::max)
     }
 
     fn features(&self, volume: &Volume) -> (&'static Features, String) {
