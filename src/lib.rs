@@ -6,7 +6,7 @@
 //! ```
 //!
 //! The data goes one way. Who uses whom: `http` and the command line → `study` → `plan` → `job` → `scene` and `technique` → `device` → `film` →
-//! `frame` → `volume` → `error`; never back (`tests/house.rs` sees to it). A job holds its scene and lets it be planned where it
+//! `frame` → `volume` → `power_law` → `error`; never back (`tests/house.rs` sees to it). A job holds its scene and lets it be planned where it
 //! runs, since a field's plan changes while it fills.
 //!
 //! | module | what it is |
@@ -26,6 +26,7 @@
 //! | [`chart`] | charts as SVG |
 //! | [`film`] | sums on the host: picture and error |
 //! | [`frame`] | picture to PNG or EXR, with its metadata |
+//! | [`power_law`] | lines on logarithmic axes |
 //!
 //! Kernels: `kernels/<technique>.cl` and `kernels/shared/`. The viewer: `static/`. Tests: `tests/<technique>.rs` and
 //! `tests/{api,stream,faults,viewer,…}.rs`.
@@ -40,6 +41,7 @@ pub mod frame;
 pub mod http;
 pub mod job;
 pub mod plan;
+pub mod power_law;
 pub mod request;
 pub mod scene;
 pub mod study;

@@ -84,6 +84,9 @@ struct StudyArgs {
     /// Fewer settings and seeds: seconds a case
     #[arg(long)]
     quick: bool,
+    /// Which of the planner's random scenes, as 20..40 (default: 100 of them, or 10)
+    #[arg(long, value_parser = study::planner::scenes)]
+    scenes: Option<std::ops::Range<u64>>,
     /// Where the results go, a JSON a case (default: studies in the data folder)
     #[arg(short, long)]
     output: Option<PathBuf>,
@@ -292,7 +295,8 @@ fn run_studies(args: &StudyArgs) -> Result<()> {
         shelf.put_stability(found)?;
     }
     if asked(PLANNER) {
-        let found = study::planner::planner(&bench, scale, &mut told)?;
+        let scenes = args.scenes.clone().unwrap_or(0..scale.pick(10, 100));
+        let found = study::planner::planner(&bench, scenes, &mut told)?;
         let ([met, timed, cheap], n) = (found.figures(), found.scenes.len());
         println!("of {n} plans {met} meet the error, {timed} the time, {cheap} the cost");
         shelf.put_planned(&found)?;

@@ -53,7 +53,20 @@ fn opencl_and_unsafe_live_in_device_only() {
 /// The way of the data: what stands to the left is not used by what stands to the right.
 #[test]
 fn layers_point_one_way() {
-    let order = ["http", "study", "plan", "job", "scene", "technique", "device", "film", "frame", "volume", "error"];
+    let order = [
+        "http",
+        "study",
+        "plan",
+        "job",
+        "scene",
+        "technique",
+        "device",
+        "film",
+        "frame",
+        "volume",
+        "power_law",
+        "error",
+    ];
     let place = |module: &str| order.iter().position(|m| *m == module);
     let mut wrong = Vec::new();
     for path in files(&root().join("src"), "rs") {

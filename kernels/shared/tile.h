@@ -34,10 +34,16 @@ static inline void cost(global uint *tiles, Tile tile, uint steps) {
     if (tile.times > 0u) atomic_add(&tiles[tile.cost_at], steps);
 }
 
-// Where in its pixel a sample goes through: the R2 sequence (Roberts 2018), in whole parts of 2^32, from the pixel's centre.
+// Where in its pixel a sample goes through: `place_in_pixel` of src/job/places.rs, which says why.
 static inline float2 place_in_pixel(uint sample) {
-    uint x = 0x80000000u + sample * 0xc13fa9a9u, y = 0x80000000u + sample * 0x91e10da6u;
-    return (float2)((float)(x >> 8) * 0x1p-24f, (float)(y >> 8) * 0x1p-24f);
+    if (sample < 4u) {
+        float angle = 0.2617994f + 2.0943951f * (float)sample;
+        return 0.5f + (sample ? 0.4714045f : 0.0f) * (float2)(cos(angle), sin(angle));
+    }
+    float u = ((float)((sample / 4u * 0xc13fa9a9u) >> 9) + 0.5f) * 0x1p-24f - 0.5f;
+    float v = ((float)((sample / 4u * 0x91e10da6u) >> 9) + 0.5f) * 0x1p-24f - 0.5f;
+    float2 turned = sample % 4u < 2u ? (float2)(u, v) : (float2)(-v, u);
+    return 0.5f + (sample % 2u ? -turned : turned);
 }
 
 // Gives the free lanes the next pixels of the tile, from `taken` on. Returns the lanes that have a new one.

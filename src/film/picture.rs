@@ -130,3 +130,19 @@ fn srgb_table() -> &'static [u8] {
         (0..=65535).map(|i| (encode(f64::from(i) / 65535.0) * 255.0).round() as u8).collect()
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::Samples;
+    use super::*;
+
+    #[test]
+    fn srgb_is_the_standard_curve() {
+        for (linear, byte) in [(0.0, 0), (0.0031308, 10), (0.2158605, 128), (0.5, 188), (1.0, 255), (7.0, 255)] {
+            let mean = [linear, linear, linear, 0.5].repeat(2);
+            let main = Samples { width: 2, height: 1, stride: 1, count: 1, mean, m2: vec![0.0; 2], tiles: None };
+            let film = Film { size: [2, 1], main, ..Film::default() };
+            assert_eq!(film.srgb8().0[0], byte, "at {linear}");
+        }
+    }
+}

@@ -1,7 +1,5 @@
 //! One set of samples of a view on the device, and which of its pixels a pass samples.
 
-use glam::Vec2;
-
 use super::context::DeviceContext;
 use super::tiling::{TILE, Tiling};
 use crate::device::{Buffer, Device};
@@ -16,6 +14,8 @@ pub(super) struct Layer {
     pub width: usize,
     pub height: usize,
     pub stride: usize,
+    /// How far apart its pixels are in the picture asked for: further than in the film's where that is a pilot's.
+    pub apart: usize,
     pub samples: u32,
     /// The kernel's table for its step.
     pub table: Buffer,
@@ -26,12 +26,13 @@ pub(super) struct Layer {
 }
 
 impl Layer {
-    /// Room for every `stride`-th pixel of a scene's picture.
+    /// Room for every `stride`-th pixel of a scene's picture, or of the pixels of it that a pilot has.
     ///
     /// # Errors
     /// [`crate::error::Error::Internal`] when the device has none.
     pub fn new(device: &Device, scene: &Scene, volume: &Volume, stride: usize, stream: u32, step: f32) -> Result<Self> {
-        let [width, height] = scene.image().map(|n| (n as usize).div_ceil(stride));
+        let apart = stride * scene.pilot().unwrap_or(1) as usize;
+        let [width, height] = scene.image().map(|n| (n as usize).div_ceil(apart));
         let tiled = |_| -> Result<_> {
             let tiling = Tiling::new(width, height);
             let buffer = device.upload(&vec![0; tiling.room()], 0)?;
@@ -40,7 +41,7 @@ impl Layer {
         let tiling = scene.view().random().map(tiled).transpose()?;
         let table = device.upload(bytemuck::cast_slice(&scene.view().table(volume, step)?), 8)?;
         let buffer = device.allocate(20 * width * height)?;
-        Ok(Self { buffer, width, height, stride, samples: 0, table, stream, tiling })
+        Ok(Self { buffer, width, height, stride, apart, samples: 0, table, stream, tiling })
     }
 
     /// Forgets what was gathered.
@@ -122,12 +123,4 @@ fn beam_pixels(lanes: usize) -> [usize; 2] {
         4 => [4, 4],
         _ => [1, 1],
     }
-}
-
-/// Where in the pixels sample `n` goes through: the R2 sequence (Roberts, "The Unreasonable Effectiveness of Quasirandom
-/// Sequences", 2018), whose first point is here the pixel's centre.
-pub(super) fn pixel_offset(n: u32) -> Vec2 {
-    const PLASTIC: f64 = 1.324_717_957_244_746;
-    let at = |power: i32| (0.5 + f64::from(n) / PLASTIC.powi(power)).fract() as f32;
-    Vec2::new(at(1), at(2))
 }

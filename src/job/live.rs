@@ -11,8 +11,8 @@ use super::field_run::FieldRun;
 use super::view_run::{Pass, ViewRun};
 use super::{Job, Snapshot};
 use crate::error::{Error, Result};
-use crate::film::Film;
 use crate::film::picture::Background;
+use crate::film::{Film, is_round};
 use crate::scene::{Scene, Subject};
 use crate::technique::Random;
 use crate::volume::Volume;
@@ -256,9 +256,8 @@ impl Live {
         if budget.time_ms.is_some_and(|ms| self.started.elapsed().as_millis() >= u128::from(ms)) {
             return Ok(Verdict::Stop("time"));
         }
-        let round = samples.is_power_of_two() || (samples % 3 == 0 && (samples / 3).is_power_of_two());
         let enough = samples >= if scene.view().random().is_some() { Random::LEAST_SAMPLES } else { 2 };
-        let Some(most) = budget.max_error.filter(|_| enough && round) else { return Ok(Verdict::GoOn) };
+        let Some(most) = budget.max_error.filter(|_| enough && is_round(samples)) else { return Ok(Verdict::GoOn) };
         let error = Film { field_error: self.field_error, ..view.film(context)? }.error();
         let noise = error.noise.unwrap_or(0.0);
         let bias = (error.total.powi(2) - noise.powi(2)).max(0.0).sqrt();

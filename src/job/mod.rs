@@ -11,8 +11,10 @@ mod field_run;
 mod layer;
 mod live;
 mod pace;
+mod places;
 mod report;
 mod resource;
+mod rounds;
 mod tiling;
 mod view_run;
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use crate::film::ErrorEstimate;
+use crate::power_law::PowerLaw;
 
 /// Where a render stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -114,14 +115,9 @@ pub(super) fn slope(trace: &[TracePoint]) -> Option<f64> {
     let points: Vec<(f64, f64)> = trace
         .iter()
         .filter(|p| p.stride == 1 && p.samples >= 2 && p.error > 0.0)
-        .map(|p| (f64::from(p.samples).ln(), p.error.ln()))
+        .map(|p| (f64::from(p.samples), p.error))
         .collect();
-    let n = points.len() as f64;
-    let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / n;
-    let (x, y) = (mean(|p| p.0), mean(|p| p.1));
-    let spread: f64 = points.iter().map(|p| (p.0 - x).powi(2)).sum();
-    let slope = points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum::<f64>() / spread;
-    (points.len() >= 3 && slope.is_finite()).then_some(slope)
+    PowerLaw::through(&points).map(|l| l.power)
 }
 
 #[cfg(test)]

@@ -5,12 +5,15 @@
 //! enough; where nothing but the step tells the two apart, it gets one for each.
 
 use std::rc::Rc;
+use std::sync::Arc;
 use std::time::Duration;
 
 use super::SampleCounts;
 use super::context::{DeviceContext, DeviceVolume, warm};
-use super::layer::{Layer, pixel_offset};
+use super::layer::Layer;
 use super::pace::Pace;
+use super::places::place_in_pixel;
+use super::rounds::Rounds;
 use crate::device::Buffer;
 use crate::device::structs::View as DeviceView;
 use crate::error::Result;
@@ -57,6 +60,7 @@ pub(super) struct ViewRun {
     longest: f64,
     least_step: f32,
     random: Option<Random>,
+    rounds: Rounds,
     /// Device time since the start.
     pub device_time: Duration,
 }
@@ -66,12 +70,12 @@ fn index(pass: Pass) -> usize {
 }
 
 impl ViewRun {
-    pub fn new(context: &mut DeviceContext, scene: &Scene, volume: &std::sync::Arc<Volume>) -> Result<Self> {
+    pub fn new(context: &mut DeviceContext, scene: &Scene, volume: &Arc<Volume>) -> Result<Self> {
         let mut plan = scene.view().plan(volume)?;
         warm(&mut context.device, &(scene.technique().source)(), &plan.variant)?;
         let on_device = context.volume(volume)?;
         let distances = distances(context, &on_device, volume, &mut plan)?;
-        let size = scene.image().map(|n| n as usize);
+        let size = scene.image().map(|n| n.div_ceil(scene.pilot().unwrap_or(1)) as usize);
         let device = &context.device;
         let sparse = match size[0].min(size[1]) {
             400.. => CONTROL[0],
@@ -97,6 +101,7 @@ impl ViewRun {
             longest,
             least_step: (LEAST_STEP_VOXELS * smallest) as f32,
             random: scene.view().random(),
+            rounds: Rounds::new(scene.pilot().is_some()),
             plan,
             volume: on_device,
             distances,
@@ -135,6 +140,7 @@ impl ViewRun {
             layer.restart(&context.device)?;
         }
         (self.pass, self.cursor, self.device_time) = (None, 0, Duration::ZERO);
+        self.rounds.forget();
         Ok(())
     }
 
@@ -164,6 +170,7 @@ impl ViewRun {
             context.device.write(&mut layer.table, 0, bytemuck::cast_slice(&table))?;
         }
         (self.pass, self.cursor) = (None, 0);
+        self.rounds.forget();
         Ok(())
     }
 
@@ -224,6 +231,10 @@ impl ViewRun {
         }
         self.layers[index(pass)].passed();
         (self.pass, self.cursor) = (None, 0);
+        // Samples that were put where the error is have no halves.
+        if pass == Pass::Main && !self.random.is_some_and(|r| r.adaptive) {
+            self.rounds.passed(context, &self.layers[index(pass)], self.device_time)?;
+        }
         Ok(Some(pass))
     }
 
@@ -237,14 +248,13 @@ impl ViewRun {
             context.device.write(&mut self.counts, 0, &[0; 32])?;
         }
         let layer = &self.layers[index(pass)];
-        let offset = pixel_offset(layer.samples);
         let view = DeviceView {
             width: layer.width as i32,
             height: layer.height as i32,
-            stride: layer.stride as i32,
+            stride: layer.apart as i32,
             sample: layer.samples as i32,
             stream: layer.stream,
-            offset: offset.to_array(),
+            offset: place_in_pixel(layer.samples).to_array(),
             step: if pass == Pass::Main { self.plan.step } else { 2.0 * self.plan.step },
             ..self.view
         };
@@ -269,6 +279,8 @@ impl ViewRun {
             stepless: self.plan.stepless,
             noisy: self.random.is_some(),
             opacity_threshold,
+            halves: self.rounds.halves(),
+            rounds: self.rounds.on_the_way(),
             ..Film::default()
         })
     }

@@ -1,5 +1,5 @@
-//! What is known of this device: by how much a sample is cheaper or dearer in a large picture than in a pilot, and what a render costs
-//! before its first sample is whole. Measured once, in less than three seconds, and kept in the data folder.
+//! What is known of this device: by how much a sample of a pixel is cheaper among its neighbours than in a pilot, and what a render costs
+//! besides its samples. Measured once, in less than three seconds, and kept in the data folder.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -12,13 +12,13 @@ use super::{Planner, pilot};
 use crate::error::Result;
 
 /// Techniques that are calibrated: one a family.
-const TECHNIQUES: [&str; 3] = ["emission_absorption", "volume_path", "isosurface"];
-/// Side of the large picture, and samples of it and of the pilot.
+const TECHNIQUES: [&str; 4] = ["emission_absorption", "isosurface", "single_scatter", "volume_path"];
+/// Side of the picture, how far apart the pixels of its pilot are, and samples of both.
 const LARGE: u32 = 256;
-const SAMPLES: [u32; 2] = [1, 12];
-const PILOT_SAMPLES: u32 = 16;
-/// Pixels of the pilot and of the large picture, between which is interpolated.
-const PIXELS: [f64; 2] = [4096.0, (LARGE * LARGE) as f64];
+const APART: u32 = 4;
+const SAMPLES: u32 = 12;
+/// Pixels of the pilot and of the whole picture, between which is interpolated.
+const PIXELS: [f64; 2] = [((LARGE / APART) * (LARGE / APART)) as f64, (LARGE * LARGE) as f64];
 
 /// Factors of a device.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -32,7 +32,7 @@ pub struct Calibration {
 /// Those of one technique.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Factors {
-    /// The time of a sample in the large picture over that in the pilot.
+    /// The time of a sample in the whole picture over that in the pilot.
     large_over_pilot: f64,
     /// What a render costs besides its samples, in samples: previews, and slices that are short until the kernel's speed is known.
     besides: f64,
@@ -103,22 +103,20 @@ impl Calibrations {
 
 /// The factors of a technique, on the built-in smoke.
 async fn measure(planner: &Planner<'_>, technique: &str) -> Result<Factors> {
-    let time = async |side: u32, samples: u32| -> Result<f64> {
-        let mut least = f64::INFINITY;
+    let time = async |apart: u32| -> Result<[f64; 2]> {
+        let mut least = [f64::INFINITY; 2];
         for seed in 0..4 {
             let request = json!({"technique": technique, "volume": {"builtin": "smoke", "resolution": 64}, "seed": seed,
-                "image": {"width": side, "height": side}, "budget": {"samples": samples}});
-            least = least.min(pilot::finish(planner, request).await?.2);
+                "image": {"width": LARGE, "height": LARGE}, "budget": {"samples": SAMPLES}});
+            let run = pilot::finish(planner, request, apart).await?;
+            least = [least[0].min(run.ms[0]), least[1].min(run.ms[1] / run.pixels as f64)];
         }
         Ok(least)
     };
-    let small = time(PIXELS[0].sqrt() as u32, PILOT_SAMPLES).await? / (f64::from(PILOT_SAMPLES) * PIXELS[0]);
-    let [one, many] = [time(LARGE, SAMPLES[0]).await?, time(LARGE, SAMPLES[1]).await?];
-    let more = f64::from(SAMPLES[1] - SAMPLES[0]);
-    let sample = (many - one) / more;
-    let known = small > 0.0 && sample > 0.0;
+    let ([_, sparse], [besides, dense]) = (time(APART).await?, time(1).await?);
+    let known = sparse > 0.0 && dense > 0.0;
     Ok(Factors {
-        large_over_pilot: if known { (sample / PIXELS[1] / small).clamp(0.1, 10.0) } else { 1.0 },
-        besides: if known { (one / sample - f64::from(SAMPLES[0])).clamp(0.0, 10.0) } else { 0.0 },
+        large_over_pilot: if known { (dense / sparse).clamp(0.1, 10.0) } else { 1.0 },
+        besides: if known { (besides / (dense * f64::from(LARGE * LARGE))).clamp(0.0, 10.0) } else { 0.0 },
     })
 }

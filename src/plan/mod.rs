@@ -24,10 +24,15 @@ pub use calibration::Calibrations;
 pub use candidates::is_auto;
 use candidates::{Candidate, Family};
 use features::Features;
+use pilot::Pilot;
 
 /// What is asked for where the budget is silent.
 const USUAL_ERROR: f64 = 0.02;
 
+/// Pilots that are made deeper for one plan, at most.
+const DEEPENED: usize = 6;
+/// Settings whose first samples are taken of the whole picture, at most.
+const CONFIRMED: usize = 3;
 /// Of fewer samples than these the film knows its noise less well than a pilot.
 const FEW: u32 = 8;
 
@@ -121,14 +126,25 @@ impl Planner<'_> {
         let image = scene.image();
         let asked = body.pointer("/budget/samples").and_then(Value::as_u64).map_or(u32::MAX, |n| n as u32);
         let most = self.limits.max_samples.min(asked);
-        let mut chosen = choose::choose(&pilots, wish, image, &calibration, most);
-        if chosen.enough || wish.time_ms.is_some() {
+        let choose = |pilots: &[Pilot]| choose::choose(pilots, wish, image, &calibration, most);
+        let mut chosen = choose(&pilots);
+        for _ in 0..DEEPENED {
             let likely = &pilots[chosen.index];
-            let besides = calibration.besides(&likely.candidate.technique);
-            let first = chosen.samples.min(pilot::CONFIRMED);
-            pilots[chosen.index] = pilot::confirm(self, body, image, likely, first, besides).await?;
-            let known = Some(chosen.index);
-            chosen = choose::choose_among(&pilots, known, wish, image, &calibration, most);
+            let deeper =
+                if chosen.enough { pilot::deepen(self, body, image, likely, chosen.samples).await? } else { None };
+            let Some(deeper) = deeper else { break };
+            pilots[chosen.index] = deeper;
+            chosen = choose(&pilots);
+        }
+        pilots.iter_mut().for_each(|p| p.hopeful = false);
+        chosen = choose(&pilots);
+        for _ in 0..CONFIRMED {
+            let likely = &pilots[chosen.index];
+            if likely.whole.is_some() || !(chosen.enough || wish.time_ms.is_some()) {
+                break;
+            }
+            pilot::confirm(self, body, &mut pilots, chosen.index).await?;
+            chosen = choose(&pilots);
         }
         considered.splice(0..0, chosen.considered);
         let best = &pilots[chosen.index];
@@ -198,11 +214,15 @@ impl Planner<'_> {
 }
 
 /// A plan's samples are enough by what the pilots know; where the film finds that it is so sooner, the render stops.
-fn budget(best: &pilot::Pilot, samples: u32, enough: bool, wish: Wish) -> Value {
+fn budget(best: &Pilot, samples: u32, enough: bool, wish: Wish) -> Value {
     let room = (choose::AIM * wish.error).powi(2) - (best.bias + best.bias_within).powi(2);
     let mut budget = json!({"samples": samples});
-    // A stepping view's film takes its places for random, and would have it go on for long.
-    if enough && best.is_random() && room > 0.0 && samples >= FEW {
+    // Where a stepping view finds its step too long it starts over with a shorter one: what the plan knows better.
+    if enough
+        && Family::of(&json!({"technique": best.candidate.technique})) == Family::Scattering
+        && room > 0.0
+        && samples >= FEW
+    {
         budget["max_error"] = json!(room.sqrt());
     }
     if let Some(time) = wish.time_ms {

@@ -66,6 +66,7 @@ pub struct Scene {
     background: Background,
     budget: Budget,
     seed: u64,
+    pilot: Option<u32>,
 }
 
 /// The radius of the sphere around a volume's box, world units.
@@ -162,6 +163,7 @@ impl Scene {
             background,
             budget,
             seed: request.seed.unwrap_or(0),
+            pilot: None,
         };
         if let Subject::Volume(volume) = &scene.subject {
             scene.view.plan(volume)?;
@@ -181,6 +183,16 @@ impl Scene {
     /// Puts another camera in.
     pub fn set_camera(&mut self, camera: Camera) {
         self.camera = camera;
+    }
+
+    /// Only every `apart`-th pixel of the picture, across and down, with what each had come to on the way.
+    pub(crate) fn into_pilot(self, apart: u32) -> Self {
+        Self { pilot: Some(apart.max(1)), ..self }
+    }
+
+    /// How far apart its pixels are, where it is a pilot.
+    pub(crate) fn pilot(&self) -> Option<u32> {
+        self.pilot
     }
 
     /// The view technique.

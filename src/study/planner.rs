@@ -1,12 +1,14 @@
 //! Whether the planner keeps its word: random scenes, each planned, rendered as planned, and compared with every setting tried by force.
 
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::bench::{Bench, Reads, Run};
+use super::machine;
 use super::oracle::Random;
 use super::record::Machine;
-use super::{Scale, machine};
 use crate::error::Result;
 
 /// What a plan may cost over the cheapest setting that would have done, and a time over the predicted one or under it.
@@ -14,13 +16,18 @@ const COST_FACTOR: f64 = 1.3;
 const TIME_FACTOR: f64 = 1.5;
 /// The truth's noise, of the error asked for.
 const TRUTH_NOISE: f64 = 0.25;
-/// Samples that are tried by force, each this often over the one before.
-const MORE: u64 = 4;
+/// The most samples that are tried by force, and that a truth has.
 const MOST_SAMPLES: u64 = 4096;
+const MOST_TRUTH: u64 = 16_384;
+/// A render that takes less, ms, is timed so often.
+const SHORT: f64 = 100.0;
+const REPEATS: usize = 5;
 
 /// What came of one scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
+    /// Which of the scenes.
+    pub scene: u64,
     /// What was asked for.
     pub request: Value,
     /// The error asked for.
@@ -42,8 +49,6 @@ pub struct Outcome {
 /// What came of all scenes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Planned {
-    /// Whether it is the short form.
-    pub quick: bool,
     /// Where it was measured.
     pub machine: Machine,
     /// Scene by scene.
@@ -93,10 +98,11 @@ impl Planned {
             self.machine.version,
             self.machine.commit
         );
-        for (i, s) in self.scenes.iter().enumerate() {
+        for s in &self.scenes {
             let mark = |kept: bool| if kept { "" } else { " **!**" };
             text += &format!(
-                "| {i} | {:.2} % | {:.2} %{} | {:.1} ms | {:.1} ms{} | {}{} | {} |\n",
+                "| {} | {:.2} % | {:.2} %{} | {:.1} ms | {:.1} ms{} | {}{} | {} |\n",
+                s.scene,
                 100.0 * s.asked,
                 100.0 * s.true_error,
                 mark(s.is_met()),
@@ -113,21 +119,30 @@ impl Planned {
     }
 }
 
+/// A range of scenes, as 20..40.
+///
+/// # Errors
+/// What would be one.
+pub fn scenes(text: &str) -> std::result::Result<Range<u64>, String> {
+    let ends = text.split_once("..").and_then(|(from, to)| Some(from.parse().ok()?..to.parse().ok()?));
+    ends.filter(|r: &Range<u64>| !r.is_empty()).ok_or_else(|| format!("'{text}' is not a range such as 20..40"))
+}
+
 /// Plans and measures the scenes; `told` hears of each.
 ///
 /// # Errors
 /// Those of the requests.
-pub fn planner(bench: &Bench, scale: Scale, told: &mut dyn FnMut(&str)) -> Result<Planned> {
-    let mut scenes = Vec::new();
-    for seed in 0..scale.pick(10, 100) {
-        let found = outcome(bench, &scene(seed))?;
+pub fn planner(bench: &Bench, scenes: Range<u64>, told: &mut dyn FnMut(&str)) -> Result<Planned> {
+    let mut outcomes = Vec::new();
+    for seed in scenes {
+        let found = outcome(bench, seed, &scene(seed))?;
         told(&format!(
             "planner, scene {seed}: asked {:.3}, is {:.4}; {:.1} ms for {:.1} predicted, cheapest {:.1?}; {}",
             found.asked, found.true_error, found.measured_ms, found.predicted_ms, found.cheapest_ms, found.planned
         ));
-        scenes.push(found);
+        outcomes.push(found);
     }
-    Ok(Planned { quick: scale == Scale::Quick, machine: machine(bench), scenes })
+    Ok(Planned { machine: machine(bench), scenes: outcomes })
 }
 
 /// A random scene: three in five scatter light, the others are composites.
@@ -185,46 +200,57 @@ fn with_samples(request: &Value, samples: u64) -> Value {
     request
 }
 
-/// The reference setting with other random numbers: of paths with weighted tracking, until it is known well enough.
+/// The reference setting with other random numbers at other places, until it is known well enough: the means of 2 × 2 pixels of a
+/// picture twice as large each way. Of paths by weighted tracking.
 fn truth(bench: &Bench, reference: &Value, asked: f64) -> Result<Known> {
     let mut request = reference.clone();
     request["seed"] = json!(77);
+    for side in ["width", "height"] {
+        request["image"][side] = json!(2 * reference["image"][side].as_u64().unwrap_or(0));
+    }
     let random = request["technique"] == "volume_path";
     if random {
         request["volume_path"]["tracking"] = json!("weighted");
     }
-    let first = bench.run(&with_samples(&request, 16), Reads::Luminance)?;
-    let noise = first.reply.pointer("/error_parts/noise").and_then(Value::as_f64).unwrap_or(0.0);
-    let samples =
-        if random { (16.0 * (noise / (TRUTH_NOISE * asked)).powi(2)).clamp(64.0, 20_000.0) as u64 } else { 512 };
-    let run = bench.run(&with_samples(&request, samples), Reads::Luminance)?;
-    let noise = run.reply.pointer("/error_parts/noise").and_then(Value::as_f64).unwrap_or(0.0);
-    let mean = run.values.iter().sum::<f64>() / run.values.len() as f64;
-    // Steps along a ray have no noise but the places within a pixel, of which there are many.
-    Ok(Known { values: run.values, mean, noise: if random { noise } else { 0.0 } })
+    let mut samples = 16;
+    loop {
+        let run = bench.run(&with_samples(&request, samples), Reads::Blocks(2))?;
+        let noise = 0.5 * run.reply.pointer("/error_parts/noise").and_then(Value::as_f64).unwrap_or(0.0);
+        let needed = (samples as f64 * (noise / (TRUTH_NOISE * asked)).powi(2)).ceil() as u64;
+        if noise <= TRUTH_NOISE * asked || samples >= MOST_TRUTH {
+            let mean = run.values.iter().sum::<f64>() / run.values.len() as f64;
+            // What the halves of evenly spread samples differ by is more than their noise: to take it off would flatter the plan.
+            return Ok(Known { values: run.values, mean, noise: if random { noise } else { 0.0 } });
+        }
+        samples = needed.clamp(2 * samples, 8 * samples).next_power_of_two().min(MOST_TRUTH);
+    }
 }
 
-fn outcome(bench: &Bench, request: &Value) -> Result<Outcome> {
+fn outcome(bench: &Bench, scene: u64, request: &Value) -> Result<Outcome> {
     let asked = request["budget"]["max_error"].as_f64().unwrap_or(0.0);
     let settings = bench.settings(request)?;
     let known = truth(bench, &settings[0].1, asked)?;
     let plan = bench.plan(request)?;
-    let first = bench.run(&plan.request, Reads::Luminance)?;
-    let run = bench.run(&plan.request, Reads::Luminance)?;
-    let measured_ms = first.device_ms.min(run.device_ms);
-    let mut cheapest: Option<(f64, String)> = None;
+    let (run, measured_ms) = timed(bench, &plan.request)?;
+    let true_error = known.error(&run);
+    // What is dearer than the plan, or than the cheapest so far, need not be tried any further.
+    let mut cheapest: Option<(f64, String)> = (true_error <= asked).then(|| (measured_ms, "the plan".into()));
     for (words, setting) in &settings {
-        if let Some(ms) = least_ms(bench, setting, &known, asked)?
-            && cheapest.as_ref().is_none_or(|(least, _)| ms < *least)
+        let dearest = cheapest.as_ref().map_or(f64::INFINITY, |c| c.0);
+        if let Some(ms) = least_ms(bench, setting, &known, asked, dearest)?
+            && ms < dearest
         {
             cheapest = Some((ms, words.clone()));
         }
     }
+    // Before and after: what else goes on here comes and goes.
+    let measured_ms = measured_ms.min(timed(bench, &plan.request)?.1);
     Ok(Outcome {
+        scene,
         request: request.clone(),
         asked,
         planned: format!("{}, {} samples, {}", plan.technique, run.samples, plan.options),
-        true_error: known.error(&run),
+        true_error,
         predicted_ms: plan.device_ms.value,
         measured_ms,
         cheapest: cheapest.as_ref().map(|c| c.1.clone()),
@@ -232,29 +258,40 @@ fn outcome(bench: &Bench, request: &Value) -> Result<Outcome> {
     })
 }
 
-/// The least device time at which a setting is within the error: between the last number of samples that is not enough and the first that
-/// is, as a power law says.
-fn least_ms(bench: &Bench, setting: &Value, known: &Known, asked: f64) -> Result<Option<f64>> {
+/// A run and its device time: of a short one the median of several.
+fn timed(bench: &Bench, request: &Value) -> Result<(Run, f64)> {
+    let run = bench.run(request, Reads::Luminance)?;
+    let mut times = vec![run.device_ms];
+    while times.len() < REPEATS && run.device_ms < SHORT {
+        times.push(bench.run(request, Reads::Luminance)?.device_ms);
+    }
+    times.sort_by(f64::total_cmp);
+    Ok((run, times[times.len() / 2]))
+}
+
+/// The least device time at which a setting is within the error, if that is less than `dearest`: of random paths between the last number
+/// of samples that is not enough and the first that is, as a power law says.
+fn least_ms(bench: &Bench, setting: &Value, known: &Known, asked: f64, dearest: f64) -> Result<Option<f64>> {
     let (mut samples, mut before): (u64, Option<(u64, f64, f64)>) = (1, None);
     while samples <= MOST_SAMPLES {
-        let run = bench.run(&with_samples(setting, samples), Reads::Luminance)?;
+        let (run, time) = timed(bench, &with_samples(setting, samples))?;
         let error = known.error(&run);
         if error <= asked {
             // Between two numbers of samples the error of random paths is known; of places that are spread evenly it jumps.
             let random = setting["technique"] == "volume_path" || setting["technique"] == "single_scatter";
-            return Ok(Some(before.filter(|_| random).map_or(run.device_ms, |(fewer, worse, ms)| {
+            return Ok(Some(before.filter(|_| random).map_or(time, |(fewer, worse, ms)| {
                 let [fewer, samples] = [fewer as f64, samples as f64];
                 let power = (error / worse).ln() / (samples / fewer).ln();
                 let needed = (fewer * (asked / worse).powf(1.0 / power)).ceil();
-                ms + (run.device_ms - ms) * ((needed - fewer) / (samples - fewer)).clamp(0.0, 1.0)
+                ms + (time - ms) * ((needed - fewer) / (samples - fewer)).clamp(0.0, 1.0)
             })));
         }
-        // A bias that more samples do not take away.
-        if samples > 16 && before.is_some_and(|(_, worse, _)| error > 0.8 * worse) {
+        // A bias that more samples do not take away, or a time that does not come back.
+        if samples > 16 && before.is_some_and(|(_, worse, _)| error > 0.9 * worse) || time > dearest {
             return Ok(None);
         }
-        before = Some((samples, error, run.device_ms));
-        samples *= MORE;
+        before = Some((samples, error, time));
+        samples *= 2;
     }
     Ok(None)
 }

@@ -9,6 +9,7 @@ use super::record::{Choice, Line, Machine, Point, Record};
 use super::{Case, Scale, Setting, Trial, Truth, fit, flip, measure};
 use crate::chart::plain;
 use crate::error::Result;
+use crate::power_law::PowerLaw;
 
 /// The errors of the table of the fastest settings.
 const ERRORS: [f64; 3] = [0.1, 0.01, 0.001];
@@ -73,7 +74,7 @@ pub fn study(
     for line in &mut lines {
         let told_apart = |p: &&Point| p.error.rmse > 3.0 * truth.known_to;
         let points: Vec<(f64, f64)> = line.points.iter().filter(told_apart).map(|p| (p.at, p.error.rmse)).collect();
-        line.slope = fit::slope(&points);
+        line.slope = PowerLaw::through(&points).map(|l| l.power);
     }
     Ok(Ok(finish(bench, case, scale, truth, lines)))
 }

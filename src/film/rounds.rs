@@ -1,0 +1,98 @@
+//! A picture on its way: what it was after fewer samples tells how well it is known, whatever its samples have in common.
+
+/// Halves that differ by less than this part of what random ones would are not random.
+const WELL_SPREAD: f64 = 0.9;
+
+/// Whether a picture is looked at after so many samples: 1, 2, 3, 4, 6, 8, 12, …
+pub(crate) fn is_round(samples: u32) -> bool {
+    samples.is_power_of_two() || (samples.is_multiple_of(3) && (samples / 3).is_power_of_two())
+}
+
+/// The picture after some samples.
+#[derive(Debug, Clone)]
+pub(crate) struct Round {
+    /// Samples per pixel.
+    pub samples: u32,
+    /// Time on the device so far.
+    pub device_ms: f64,
+    /// Linear luminance of every pixel.
+    pub luminance: Vec<f32>,
+}
+
+impl Round {
+    /// The root mean square of the difference to another.
+    pub fn apart(&self, other: &Round) -> f64 {
+        let squares = self.luminance.iter().zip(&other.luminance).map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2));
+        (squares.sum::<f64>() / self.luminance.len().max(1) as f64).sqrt()
+    }
+}
+
+/// What the first half of the samples differs by from all of them, A − (A + B) / 2. Of random samples its square is the variance of the
+/// mean itself. Where samples are spread evenly, as the places in a pixel are, the mean converges faster than theirs would, and the two
+/// halves differ by less, yet by no less than the mean is wrong: each of them is wrong by more than the mean of both.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Halves {
+    /// Samples of both.
+    pub samples: u32,
+    /// Root mean square over the pixels, of luminance.
+    pub apart: f64,
+}
+
+impl Halves {
+    /// Of the picture after half of its samples, and after all of them.
+    pub fn of(half: &Round, all: &Round) -> Self {
+        Self { samples: all.samples, apart: half.apart(all) }
+    }
+
+    /// The noise after `samples` of which random ones would have `random`, where that is clearly less; more samples are taken to be
+    /// random.
+    pub fn noise(&self, samples: u32, random: f64) -> Option<f64> {
+        let noise = self.apart * (f64::from(self.samples) / f64::from(samples)).sqrt();
+        (noise < WELL_SPREAD * random).then_some(noise)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The mean of n samples of an edge that covers `part` of each pixel, at places n/N or by chance.
+    fn edges(samples: u32, place: impl Fn(u32, usize) -> f64) -> Round {
+        let part = |pixel: usize| (pixel as f64 * 0.618).fract();
+        let mean = |pixel: usize| {
+            let lit = (0..samples).filter(|n| place(*n, pixel) < part(pixel)).count();
+            (lit as f64 / f64::from(samples)) as f32
+        };
+        Round { samples, device_ms: 0.0, luminance: (0..2000).map(mean).collect() }
+    }
+
+    fn truth() -> Round {
+        let part = |pixel: usize| (pixel as f64 * 0.618).fract() as f32;
+        Round { samples: 0, device_ms: 0.0, luminance: (0..2000).map(part).collect() }
+    }
+
+    #[test]
+    fn places_that_are_spread_evenly_are_better_than_random_ones_and_the_halves_know() {
+        // Variance of a sample: the mean of p (1 − p), 1/6.
+        let random = |n: u32| (1.0 / 6.0 / f64::from(n)).sqrt();
+        let golden = |n: u32, _| (0.5 + f64::from(n) * 0.618_033_988_75).fract();
+        for n in [32, 128, 512] {
+            let (half, all) = (edges(n / 2, golden), edges(n, golden));
+            let told = Halves::of(&half, &all).noise(n, random(n));
+            let wrong = all.apart(&truth());
+            assert!(told.is_some_and(|t| t >= wrong && t < 3.0 * wrong), "{n}: {told:?} of {wrong}");
+        }
+        let hash = |n: u32, pixel: usize| {
+            let mut state = (u64::from(n) << 32 | pixel as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            state = (state ^ (state >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            ((state ^ (state >> 32)) >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let halves = Halves::of(&edges(16, hash), &edges(32, hash));
+        assert_eq!(
+            halves.noise(32, random(32)),
+            None,
+            "of random ones the samples' own variance is better: {halves:?}"
+        );
+        assert!((halves.apart / random(32) - 1.0).abs() < 0.1, "{halves:?}");
+    }
+}

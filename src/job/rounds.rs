@@ -1,0 +1,62 @@
+//! What a picture was after fewer samples: of a render the last that its halves are compared by, of a pilot all of them.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use super::context::DeviceContext;
+use super::layer::Layer;
+use crate::error::Result;
+use crate::film::{Halves, Round, is_round};
+
+/// Samples after which a render's picture is first kept: before, a moving camera has had its frames.
+const FIRST: u32 = 4;
+
+/// The rounds of a picture.
+pub(super) struct Rounds {
+    pilot: bool,
+    kept: Vec<Arc<Round>>,
+    halves: Option<Halves>,
+}
+
+impl Rounds {
+    pub fn new(pilot: bool) -> Self {
+        Self { pilot, kept: Vec::new(), halves: None }
+    }
+
+    /// Another camera or step.
+    pub fn forget(&mut self) {
+        self.kept.clear();
+        self.halves = None;
+    }
+
+    /// After a pass: keeps what the picture is after 4, 8, 16, … samples, and notes what it differs by from that of half as many.
+    pub fn passed(&mut self, context: &DeviceContext, layer: &Layer, device_time: Duration) -> Result<()> {
+        let samples = layer.samples;
+        let whole = samples.is_power_of_two();
+        if !(if self.pilot { is_round(samples) } else { samples >= FIRST && whole }) {
+            return Ok(());
+        }
+        let main = layer.read(context)?;
+        let luminance = (0..main.pixels()).map(|i| main.luminance(i) as f32).collect();
+        let round = Round { samples, device_ms: device_time.as_secs_f64() * 1e3, luminance };
+        if whole {
+            let half = self.kept.iter().find(|r| 2 * r.samples == samples);
+            self.halves = half.map(|half| Halves::of(half, &round)).or(self.halves);
+        }
+        if !self.pilot {
+            self.kept.clear();
+        }
+        self.kept.push(Arc::new(round));
+        Ok(())
+    }
+
+    /// What the newest two differ by of which one has twice as many samples.
+    pub fn halves(&self) -> Option<Halves> {
+        self.halves
+    }
+
+    /// All that is kept, for a planner.
+    pub fn on_the_way(&self) -> Vec<Arc<Round>> {
+        if self.pilot { self.kept.clone() } else { Vec::new() }
+    }
+}
