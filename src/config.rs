@@ -149,6 +149,9 @@ pub struct Config {
     /// Origins that browsers may call from (CORS); none unless named
     #[arg(long, env = "CLOUDCHAMBER_CORS_ORIGIN", value_delimiter = ',')]
     pub cors_origin: Vec<String>,
+    /// Measure the device for the planner at the start, once for a data folder, rather than at the first plan
+    #[arg(long, env = "CLOUDCHAMBER_CALIBRATE", default_value_t = true, action = clap::ArgAction::Set)]
+    pub calibrate: bool,
     /// Milliseconds that running renders get after SIGTERM
     #[arg(long, env = "CLOUDCHAMBER_DRAIN_MS", default_value_t = 10_000)]
     pub drain_ms: u64,

@@ -2,12 +2,14 @@
 
 pub mod difference;
 mod estimate;
+mod lowered;
 pub mod picture;
 mod rounds;
 
 use std::sync::Arc;
 
 pub use estimate::ErrorEstimate;
+pub use lowered::Lowered;
 use picture::Background;
 pub(crate) use rounds::{Halves, Round, is_round};
 
@@ -152,6 +154,10 @@ pub struct Film {
     pub field_error: Option<f64>,
     /// What is behind the volume.
     pub background: Background,
+    /// What was lowered of it, so that it came in time,
+    pub lowered: Lowered,
+    /// and what the longer step loses, relative, where that is known.
+    pub step_loss: Option<f64>,
     /// What half of the samples differ by from the others, once that is known.
     pub(crate) halves: Option<Halves>,
     /// What a pilot had come to on the way.
@@ -169,6 +175,12 @@ impl Film {
         let rms = (squared / self.main.pixels().max(1) as f64).sqrt();
         let mean = self.main.mean_luminance();
         Some(if mean > 0.0 { rms / mean } else { rms })
+    }
+
+    /// What half the resolution would lose, relative.
+    pub fn resolution_loss(&self) -> f64 {
+        let (mean, loss) = (self.main.mean_luminance(), self.main.resolution_error());
+        if mean > 0.0 { loss / mean } else { loss }
     }
 
     /// The luminance of all samples together.

@@ -65,6 +65,8 @@ export class Status {
     set('samples', frame.samples === null ? '–' : String(frame.samples));
     set('error', frame.error === null ? 'unknown' : percent(frame.error));
     set('elapsed', milliseconds(frame.elapsedMs));
+    set('lowered', frame.lowered ? `Lowered for now: ${frame.lowered}` : '');
+    byId('lowered').hidden = !frame.lowered;
     if (!frame.final) this.state('running');
   }
 
@@ -94,9 +96,10 @@ export class Status {
   #plan(plan) {
     if (!plan) return;
     const wasOpen = byId('plan').querySelector('details')?.open ?? false;
-    const reasons = (plan.reasons ?? []).map((reason) => make('li', { textContent: typeof reason === 'string' ? reason : reason.message ?? JSON.stringify(reason) }));
+    const said = [...(plan.planned?.reasons ?? []), ...(plan.reasons ?? [])];
+    const reasons = said.map((reason) => make('li', { textContent: typeof reason === 'string' ? reason : reason.message ?? JSON.stringify(reason) }));
     byId('plan').replaceChildren(
-      make('p', { className: 'facts', textContent: plan.technique ? `Planned: ${plan.technique.replaceAll('_', ' ')}` : '' }),
+      make('p', { className: 'facts', textContent: plan.technique ? `Planned: ${plan.technique.replaceAll('_', ' ')}${predicted(plan.planned)}` : '' }),
       ...(reasons.length > 0 ? [make('details', { open: wasOpen },
         make('summary', { textContent: `Why: ${reasons.length} ${reasons.length === 1 ? 'reason' : 'reasons'}` }),
         make('ul', { className: 'reasons' }, ...reasons))] : []),
@@ -137,6 +140,12 @@ export class Status {
       image.hidden = true; // a render that was replaced meanwhile has no chart
     }
   }
+}
+
+/** What the planner expects, where it was asked. */
+function predicted(planned) {
+  if (!planned) return '';
+  return `, ${planned.samples} ${planned.samples === 1 ? 'sample' : 'samples'}, about ${milliseconds(planned.device_ms.value)} on the device, ${percent(planned.error.value)} wrong`;
 }
 
 function table(caption, rows) {

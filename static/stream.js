@@ -117,6 +117,7 @@ export function frameOf({ headers, bytes }) {
     samples: number('Samples'),
     error: number('Error'),
     elapsedMs: number('Elapsed-Ms'),
+    lowered: headers.get('X-Cloudchamber-Lowered') ?? '',
     final: headers.get('X-Cloudchamber-Final') === 'true',
   };
 }

@@ -15,6 +15,8 @@ export class Techniques {
     this.transfer = transfer;
     this.changed = changed;
     this.select = document.getElementById('technique');
+    this.planned = document.getElementById('planned');
+    this.planned.addEventListener('change', changed);
     this.select.addEventListener('change', () => {
       this.#show();
       changed();
@@ -41,6 +43,8 @@ export class Techniques {
     const parameters = this.#of(name).read() ?? {};
     const transfer = this.#hasTransfer(name) ? this.transfer.read() : undefined;
     if (transfer !== undefined) parameters[TRANSFER] = transfer;
+    // The planner takes what is not given from the technique whose parameters are there, if only by name.
+    if (this.planned.checked) return { technique: 'auto', [name]: parameters };
     return { technique: name, ...(Object.keys(parameters).length > 0 && { [name]: parameters }) };
   }
 

@@ -40,6 +40,9 @@ impl Film {
         let (discretisation, joint) = match (&self.control, self.main.stride) {
             (Some(control), 1) => self.against(control),
             _ if self.stepless => (Some(0.0), None),
+            _ if self.step_loss.is_some() => {
+                (self.step_loss.map(|loss| if mean > 0.0 { loss * mean } else { loss }), None)
+            }
             _ => (None, None),
         };
         let resolution = (self.main.stride > 1).then(|| self.main.resolution_error());

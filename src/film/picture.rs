@@ -25,8 +25,9 @@ impl Film {
     /// What a picture of this film says of itself. No times: the same request and number of samples gives the same bytes.
     pub fn description(&self, error: &ErrorEstimate) -> String {
         let stride = self.main.stride;
-        serde_json::json!({"samples": self.main.count, "error": error.total, "error_parts": error, "stride": stride})
-            .to_string()
+        serde_json::json!({"samples": self.main.count, "error": error.total, "error_parts": error, "stride": stride,
+            "lowered": self.lowered.words()})
+        .to_string()
     }
 
     /// The film as PNG bytes, its error, and how many values were clipped at white. Error and colours are worked out side by side:

@@ -83,6 +83,15 @@ impl App {
     }
 }
 
+/// Measures the device for the planner; a plan that comes meanwhile waits for it.
+async fn calibrate(app: App) {
+    if app.engine.ready().await.is_ok()
+        && let Err(error) = plans::planner(&app).calibrate().await
+    {
+        tracing::warn!(%error, "the device is not calibrated");
+    }
+}
+
 /// A server that is bound and starting.
 pub struct Server {
     listener: TcpListener,
@@ -115,6 +124,9 @@ impl Server {
             static_dir: config.static_dir.clone(),
             metrics: info::recorder()?,
         };
+        if config.calibrate {
+            tokio::spawn(calibrate(app.clone()));
+        }
         let router = routes::router(app, guard::Tokens::read(config)?, &config.cors_origin)?;
         let listener = TcpListener::bind(config.listen)
             .await

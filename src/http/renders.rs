@@ -132,13 +132,15 @@ async fn wait_for(app: &App, job: &Job, last: bool) -> Result<Arc<Frame>> {
 }
 
 /// What a frame says of itself in headers.
-pub(super) fn frame_headers(frame: &Frame) -> [(&'static str, String); 4] {
-    [
+pub(super) fn frame_headers(frame: &Frame) -> Vec<(&'static str, String)> {
+    let lowered = (!frame.lowered.is_none()).then(|| ("X-Cloudchamber-Lowered", frame.lowered.words().join("; ")));
+    let always = [
         ("X-Cloudchamber-Samples", frame.samples.to_string()),
         ("X-Cloudchamber-Error", format!("{:.6}", frame.error.total)),
         ("X-Cloudchamber-Elapsed-Ms", format!("{:.1}", frame.elapsed_ms)),
         ("X-Cloudchamber-Final", frame.is_final.to_string()),
-    ]
+    ];
+    always.into_iter().chain(lowered).collect()
 }
 
 fn with_frame_headers(response: Response, frame: &Frame, etag: &str) -> Response {

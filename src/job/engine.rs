@@ -156,17 +156,18 @@ impl Engine {
     }
 
     /// The same with what the planner said of it.
-    pub fn submit_planned(&self, place: Place, request: Value, scene: Scene, planned: Option<Value>) -> Arc<Job> {
-        self.start_job(place, Job::new(request, scene, planned, false))
-    }
-
-    /// Queues a render that nobody sees but the caller: it is not listed, and forgotten when it ends.
-    pub fn submit_pilot(&self, place: Place, request: Value, scene: Scene) -> Arc<Job> {
-        self.start_job(place, Job::new(request, scene, None, true))
-    }
-
-    fn start_job(&self, mut place: Place, job: Arc<Job>) -> Arc<Job> {
+    pub fn submit_planned(&self, mut place: Place, request: Value, scene: Scene, planned: Option<Value>) -> Arc<Job> {
         place.taken = true;
+        self.start_job(Job::new(request, scene, planned, false))
+    }
+
+    /// Queues a render that nobody sees but the caller: it is not listed, and forgotten when it ends. It takes no place of its own: the
+    /// plan that it is for holds one.
+    pub fn submit_pilot(&self, request: Value, scene: Scene) -> Arc<Job> {
+        self.start_job(Job::new(request, scene, None, true))
+    }
+
+    fn start_job(&self, job: Arc<Job>) -> Arc<Job> {
         self.jobs().by_id.insert(job.id().to_owned(), job.clone());
         self.inner.runtime.spawn(develop::frames(Arc::downgrade(&job), self.clone()));
         self.run(&job);
@@ -229,14 +230,14 @@ impl Engine {
 
     /// Notes that a job ended, and forgets the oldest ended ones past the limits of what is kept.
     pub(super) fn ended(&self, job: &Arc<Job>) {
+        if job.is_pilot() {
+            self.jobs().by_id.remove(job.id());
+            return;
+        }
         self.inner.unfinished.fetch_sub(1, Ordering::AcqRel);
         metrics::counter!("cloudchamber_renders_ended_total", "state" => format!("{:?}", job.state()).to_lowercase())
             .increment(1);
         let mut jobs = self.jobs();
-        if job.is_pilot() {
-            jobs.by_id.remove(job.id());
-            return;
-        }
         // It may run again by now, or have ended twice.
         if job.state().is_terminal() && !jobs.ended.iter().any(|id| id == job.id()) {
             jobs.ended.push_back(job.id().to_owned());

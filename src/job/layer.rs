@@ -19,6 +19,8 @@ pub(super) struct Layer {
     pub samples: u32,
     /// The kernel's table for its step.
     pub table: Buffer,
+    /// Its step, world units.
+    pub step: f32,
     /// Tells its random numbers from the others'.
     pub stream: u32,
     /// Of a view that renders tiles: what its passes sample.
@@ -41,7 +43,7 @@ impl Layer {
         let tiling = scene.view().random().map(tiled).transpose()?;
         let table = device.upload(bytemuck::cast_slice(&scene.view().table(volume, step)?), 8)?;
         let buffer = device.allocate(20 * width * height)?;
-        Ok(Self { buffer, width, height, stride, apart, samples: 0, table, stream, tiling })
+        Ok(Self { buffer, width, height, stride, apart, samples: 0, table, step, stream, tiling })
     }
 
     /// Forgets what was gathered.

@@ -8,13 +8,15 @@ use serde_json::{Value, json};
 
 use super::context::DeviceContext;
 use super::field_run::FieldRun;
+use super::motion::Motion;
+use super::report::warnings;
+use super::verdict::{Verdict, verdict};
 use super::view_run::{Pass, ViewRun};
 use super::{Job, Snapshot};
 use crate::error::{Error, Result};
+use crate::film::Film;
 use crate::film::picture::Background;
-use crate::film::{Film, is_round};
 use crate::scene::{Scene, Subject};
-use crate::technique::Random;
 use crate::volume::Volume;
 
 /// A turn on the device: long enough to be worth a launch, short enough that nobody waits and a cancel is felt at once.
@@ -30,15 +32,6 @@ pub(super) enum Turn {
     Again,
     /// The device is through with the job.
     Over,
-}
-
-/// What to do after a pass.
-enum Verdict {
-    GoOn,
-    /// Start over with half the step.
-    Refine,
-    /// Stop, and why.
-    Stop(&'static str),
 }
 
 /// A job with its buffers.
@@ -57,6 +50,9 @@ pub(super) struct Live {
     /// The picture when the field had half its histories.
     half: Option<Film>,
     field_error: Option<f64>,
+    motion: Motion,
+    /// A picture of a moving camera is there, and the one before is still being developed.
+    unseen: bool,
     last_frame: Option<Instant>,
 }
 
@@ -76,6 +72,8 @@ impl Live {
             view: None,
             half: None,
             field_error: None,
+            motion: Motion::new(),
+            unseen: false,
             last_frame: None,
         }
     }
@@ -110,9 +108,31 @@ impl Live {
         }
         self.started = Instant::now();
         self.last_frame = None;
+        self.unseen = false;
         self.half = None;
+        self.learn_motion();
         self.job.started();
         let complete = self.job.lock().complete_field.clone();
+        self.aim(context, complete)?;
+        match (&mut self.view, &self.scene, &self.volume) {
+            (Some(view), Some(scene), Some(volume)) if self.generation > 0 => {
+                view.hurry(context, scene, volume, &self.motion)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// From the newest picture, and how long the first of the camera before took.
+    fn learn_motion(&mut self) {
+        let (seen, took) = {
+            let mut progress = self.job.lock();
+            (progress.film.clone().zip(progress.error), progress.first_frame_before.take())
+        };
+        self.motion.learn(seen.as_ref().map(|(film, error)| (&**film, error)), took);
+    }
+
+    /// Points the view at the newest camera, or begins it.
+    fn aim(&mut self, context: &mut DeviceContext, complete: Option<Arc<Volume>>) -> Result<()> {
         let Some(scene) = &self.scene else { return Ok(()) };
         match (scene.subject(), &self.volume, &mut self.view) {
             (_, Some(volume), Some(view)) => {
@@ -176,8 +196,16 @@ impl Live {
     }
 
     fn view_turn(&mut self, context: &mut DeviceContext) -> Result<Turn> {
+        if self.unseen && !self.job.developing.swap(true, Ordering::AcqRel) {
+            self.snapshot(context, None)?;
+        }
         let Some(view) = &mut self.view else { return Ok(Turn::Over) };
         let Some(pass) = view.slice(context, SLICE)? else { return Ok(Turn::Again) };
+        if pass == Pass::Moving {
+            // Not left out because the frame before is still being encoded: the next camera is not followed before this is seen.
+            self.unseen = true;
+            return Ok(Turn::Again);
+        }
         let unfinished_field = self.field.as_ref().is_some_and(|f| !f.is_done());
         if unfinished_field {
             if pass == Pass::Main {
@@ -205,8 +233,8 @@ impl Live {
             }
             Verdict::GoOn => {
                 let due = self.last_frame.is_none_or(|t| t.elapsed() >= FRAME_EVERY);
-                let proper =
-                    pass == Pass::Main || self.view.as_ref().is_some_and(|v| v.samples() == 0 && !v.is_quick());
+                let preview = |v: &ViewRun| v.samples() == 0 && !v.is_quick() && !v.has_hurried();
+                let proper = pass == Pass::Main || self.view.as_ref().is_some_and(preview);
                 if due && proper && !self.job.developing.swap(true, Ordering::AcqRel) {
                     self.snapshot(context, None)?;
                 }
@@ -241,39 +269,13 @@ impl Live {
         Ok(())
     }
 
-    /// What to do after a pass. The error is looked at after 2, 3, 4, 6, 8, 12, … samples, a fixed order, so that the same
-    /// request stops at the same sample. Where the step, not the noise, keeps the error above what was asked for, the step is
-    /// halved; where nothing is left to halve, the render stops and says so.
     fn verdict(&self, context: &DeviceContext, pass: Pass) -> Result<Verdict> {
-        let (Some(view), Some(scene)) = (&self.view, &self.scene) else { return Ok(Verdict::GoOn) };
-        let (samples, budget) = (view.samples(), scene.budget());
-        if pass != Pass::Main {
-            return Ok(Verdict::GoOn);
-        }
-        if samples >= budget.samples {
-            return Ok(Verdict::Stop("samples"));
-        }
-        if budget.time_ms.is_some_and(|ms| self.started.elapsed().as_millis() >= u128::from(ms)) {
-            return Ok(Verdict::Stop("time"));
-        }
-        let enough = samples >= if scene.view().random().is_some() { Random::LEAST_SAMPLES } else { 2 };
-        let Some(most) = budget.max_error.filter(|_| enough && is_round(samples)) else { return Ok(Verdict::GoOn) };
-        let error = Film { field_error: self.field_error, ..view.film(context)? }.error();
-        let noise = error.noise.unwrap_or(0.0);
-        let bias = (error.total.powi(2) - noise.powi(2)).max(0.0).sqrt();
-        if error.total <= most {
-            Ok(Verdict::Stop("error"))
-        } else if bias > 0.7 * most && samples >= 4 && noise < bias {
-            let by_step = error.discretisation.unwrap_or(0.0) > 0.5 * bias && view.can_halve_step();
-            Ok(if by_step {
-                Verdict::Refine
-            } else if noise < 0.1 * bias {
-                Verdict::Stop("floor")
-            } else {
-                Verdict::GoOn
-            })
-        } else {
-            Ok(Verdict::GoOn)
+        match (&self.view, &self.scene) {
+            (Some(view), Some(scene)) if pass == Pass::Main => {
+                let film = || Ok(Film { field_error: self.field_error, ..view.film(context)? });
+                verdict(view, scene, self.started, film)
+            }
+            _ => Ok(Verdict::GoOn),
         }
     }
 
@@ -291,29 +293,9 @@ impl Live {
             result: self.result.clone(),
             stopped_by,
         };
+        self.unseen = false;
         self.last_frame = Some(Instant::now());
         self.job.snapshots.send_replace(Some(Arc::new(snapshot)));
         Ok(())
     }
-}
-
-/// What a reader should know of the volume, in codes and words.
-fn warnings(volume: &Volume, scene: &Scene) -> Vec<Value> {
-    let mut warnings: Vec<Value> =
-        volume.notes().iter().map(|n| json!({"code": "volume_note", "message": n})).collect();
-    if volume.non_finite() > 0 {
-        let message = format!(
-            "{} voxels are not finite; they and the cells they touch are rendered as empty",
-            volume.non_finite()
-        );
-        warnings.push(
-            json!({"code": "non_finite_voxels", "message": message, "measured": volume.non_finite(), "bound": 0}),
-        );
-    }
-    if scene.clip().removes_all(volume) {
-        let message = "the clipping planes leave nothing of the volume";
-        warnings.push(json!({"code": "clipped_away", "message": message}));
-    }
-    warnings.extend(scene.view().warnings(volume));
-    warnings
 }

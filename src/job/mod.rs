@@ -6,16 +6,19 @@
 
 mod context;
 mod develop;
+mod distances;
 mod engine;
 mod field_run;
 mod layer;
 mod live;
+mod motion;
 mod pace;
 mod places;
 mod report;
 mod resource;
 mod rounds;
 mod tiling;
+mod verdict;
 mod view_run;
 
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -97,6 +100,8 @@ pub(crate) struct Progress {
     pub warnings: Vec<Value>,
     pub trace: Vec<TracePoint>,
     pub timings: Timings,
+    /// How long the camera before the newest one waited for its first frame, ms.
+    pub first_frame_before: Option<f64>,
     pub counts: Counts,
     pub samples: u32,
     pub error: Option<ErrorEstimate>,
@@ -139,6 +144,7 @@ impl Job {
             warnings: Vec::new(),
             trace: Vec::new(),
             timings: Timings::default(),
+            first_frame_before: None,
             counts: Counts::default(),
             samples: 0,
             error: None,
@@ -268,6 +274,7 @@ impl Job {
         progress.generation += 1;
         progress.asked = Instant::now();
         progress.trace.clear();
+        progress.first_frame_before = progress.timings.first_frame_ms;
         progress.timings = Timings::default();
         progress.stopped_by = None;
         let again = !progress.in_engine;
@@ -341,6 +348,7 @@ impl Job {
             png: png.into(),
             samples: snapshot.film.main.count,
             error,
+            lowered: snapshot.film.lowered,
             elapsed_ms: snapshot.elapsed_ms,
             device_ms: snapshot.device_ms,
             is_final: ends,

@@ -10,16 +10,18 @@ use std::time::Duration;
 
 use super::SampleCounts;
 use super::context::{DeviceContext, DeviceVolume, warm};
+use super::distances::distances;
 use super::layer::Layer;
+use super::motion::{Motion, Moving};
 use super::pace::Pace;
 use super::places::place_in_pixel;
 use super::rounds::Rounds;
 use crate::device::Buffer;
 use crate::device::structs::View as DeviceView;
 use crate::error::Result;
-use crate::film::Film;
+use crate::film::{Film, Lowered};
 use crate::scene::{self, Scene};
-use crate::technique::{CellUse, Random, ViewPlan};
+use crate::technique::{Random, ViewPlan};
 use crate::volume::Volume;
 
 /// The shortest step that `max_error` leads to, in voxels: the shortest that a request may ask for.
@@ -34,6 +36,8 @@ const CONTROL: [usize; 3] = [8, 4, 2];
 pub(super) enum Pass {
     Control,
     Main,
+    /// A picture that is in time while the camera moves.
+    Moving,
 }
 
 /// A view at work.
@@ -50,6 +54,9 @@ pub(super) struct ViewRun {
     pass_view: DeviceView,
     size: [usize; 2],
     layers: [Layer; 2],
+    moving: Option<Moving>,
+    /// What a ray of the step asked for takes, where it was last seen in motion, ms.
+    ray_ms: Option<f64>,
     pass: Option<Pass>,
     cursor: usize,
     pace: Pace,
@@ -63,10 +70,6 @@ pub(super) struct ViewRun {
     rounds: Rounds,
     /// Device time since the start.
     pub device_time: Duration,
-}
-
-fn index(pass: Pass) -> usize {
-    pass as usize
 }
 
 impl ViewRun {
@@ -112,6 +115,8 @@ impl ViewRun {
             pass_view: view,
             size,
             layers,
+            moving: None,
+            ray_ms: None,
             pass,
             cursor,
             device_time,
@@ -146,7 +151,7 @@ impl ViewRun {
 
     /// Samples per pixel of the passes proper.
     pub fn samples(&self) -> u32 {
-        self.layers[index(Pass::Main)].samples
+        self.layers[1].samples
     }
 
     /// Whether a picture of the control is not worth showing.
@@ -165,7 +170,7 @@ impl ViewRun {
         self.plan.step *= 0.5;
         self.pace = Pace::new(context.device.info(), self.longest / f64::from(self.plan.step), None);
         for (layer, step) in self.layers.iter_mut().zip([2.0 * self.plan.step, self.plan.step]) {
-            layer.samples = 0;
+            (layer.samples, layer.step) = (0, step);
             let table = scene.view().table(volume, step)?;
             context.device.write(&mut layer.table, 0, bytemuck::cast_slice(&table))?;
         }
@@ -183,7 +188,45 @@ impl ViewRun {
         self.view.jittered == 0
     }
 
+    fn layer(&self, pass: Pass) -> &Layer {
+        match (pass, &self.moving) {
+            (Pass::Moving, Some(moving)) => &moving.layer,
+            (Pass::Control, _) => &self.layers[0],
+            _ => &self.layers[1],
+        }
+    }
+
+    fn layer_mut(&mut self, pass: Pass) -> &mut Layer {
+        match (pass, &mut self.moving) {
+            (Pass::Moving, Some(moving)) => &mut moving.layer,
+            (Pass::Control, _) => &mut self.layers[0],
+            _ => &mut self.layers[1],
+        }
+    }
+
+    /// The camera moves: where all of the picture would be late, what loses the least is lowered in the first frame.
+    pub fn hurry(&mut self, context: &DeviceContext, scene: &Scene, volume: &Volume, motion: &Motion) -> Result<()> {
+        let rays = (self.size[0] * self.size[1]) as f64;
+        let ray_ms = self.ray_ms.or_else(|| context.speed(&self.plan.variant).map(f64::recip));
+        let known = ray_ms.map(|ray_ms| motion.least(rays, ray_ms, self.plan.stepless));
+        let (lowered, step_loss) = known.unwrap_or_default();
+        let step = self.plan.step;
+        let before = self.moving.take();
+        if !lowered.is_none() {
+            self.moving = Some(Moving::new(context, scene, volume, step, lowered, step_loss, before)?);
+        }
+        Ok(())
+    }
+
+    /// Whether a picture is there that was made to be in time.
+    pub fn has_hurried(&self) -> bool {
+        self.moving.as_ref().is_some_and(|m| m.layer.samples > 0)
+    }
+
     fn next_pass(&self) -> Pass {
+        if self.moving.as_ref().is_some_and(|m| m.layer.samples == 0) && self.samples() == 0 {
+            return Pass::Moving;
+        }
         let [control, main] = &self.layers;
         let owed = match main.samples {
             // The first picture; there is nothing to control.
@@ -202,12 +245,12 @@ impl ViewRun {
             Some(pass) => pass,
             None => self.begin(context)?,
         };
-        let layer = &self.layers[index(pass)];
+        let layer = self.layer(pass);
         let (beams, rays) = layer.items(context.device.info().lanes as usize);
         let items = self.pace.items(context.device.info(), slice, rays).min(beams - self.cursor);
         self.pass_view.first_beam = self.cursor as i32;
         context.device.write(&mut self.view_buffer, 0, bytemuck::bytes_of(&self.pass_view))?;
-        let layer = &self.layers[index(pass)];
+        let layer = self.layer(pass);
         let mut arguments = vec![
             &self.view_buffer,
             &self.parameters,
@@ -226,14 +269,18 @@ impl ViewRun {
         if self.cursor < beams {
             return Ok(None);
         }
+        if let (Pass::Moving, Some(moving)) = (pass, &self.moving) {
+            self.ray_ms = Some(moving.ray_ms(self.pass_time.as_secs_f64() * 1e3));
+        }
         if pass == Pass::Main {
+            self.ray_ms = None;
             context.measured(&self.plan.variant, self.size[0] * self.size[1], self.pass_time);
         }
-        self.layers[index(pass)].passed();
+        self.layer_mut(pass).passed();
         (self.pass, self.cursor) = (None, 0);
         // Samples that were put where the error is have no halves.
         if pass == Pass::Main && !self.random.is_some_and(|r| r.adaptive) {
-            self.rounds.passed(context, &self.layers[index(pass)], self.device_time)?;
+            self.rounds.passed(context, &self.layers[1], self.device_time)?;
         }
         Ok(Some(pass))
     }
@@ -242,12 +289,12 @@ impl ViewRun {
     fn begin(&mut self, context: &DeviceContext) -> Result<Pass> {
         let pass = self.next_pass();
         let adaptive = pass == Pass::Main && self.random.is_some_and(|r| r.adaptive);
-        self.layers[index(pass)].choose_tiles(context, adaptive)?;
+        self.layer_mut(pass).choose_tiles(context, adaptive)?;
         if pass == Pass::Main && self.samples() == 0 {
             // What is counted is of the picture, not of its preview.
             context.device.write(&mut self.counts, 0, &[0; 32])?;
         }
-        let layer = &self.layers[index(pass)];
+        let layer = self.layer(pass);
         let view = DeviceView {
             width: layer.width as i32,
             height: layer.height as i32,
@@ -255,7 +302,7 @@ impl ViewRun {
             sample: layer.samples as i32,
             stream: layer.stream,
             offset: place_in_pixel(layer.samples).to_array(),
-            step: if pass == Pass::Main { self.plan.step } else { 2.0 * self.plan.step },
+            step: layer.step,
             ..self.view
         };
         self.pass_view = view;
@@ -267,8 +314,18 @@ impl ViewRun {
     /// Reads what there is to see: the passes proper, or before the first of them the control.
     pub fn film(&self, context: &DeviceContext) -> Result<Film> {
         let [control, main] = &self.layers;
-        let shown = if main.samples > 0 { main } else { control };
-        let controlled = shown.stride == 1 && control.samples > 0 && !self.plan.stepless;
+        let moving = self.moving.as_ref().filter(|m| main.samples == 0 && m.layer.samples > 0);
+        let shown = match (main.samples, moving) {
+            (1.., _) => main,
+            (_, Some(moving)) => &moving.layer,
+            _ => control,
+        };
+        let lowered = match (main.samples, moving) {
+            (1.., _) => Lowered::default(),
+            (_, Some(moving)) => moving.lowered,
+            _ => Lowered { apart: control.stride as u32, step: if self.plan.stepless { 1.0 } else { 2.0 } },
+        };
+        let controlled = main.samples > 0 && control.samples > 0 && !self.plan.stepless;
         let control = controlled.then(|| control.read(context)).transpose()?;
         let opacity_threshold = self.plan.opacity_threshold;
         Ok(Film {
@@ -279,6 +336,8 @@ impl ViewRun {
             stepless: self.plan.stepless,
             noisy: self.random.is_some(),
             opacity_threshold,
+            lowered,
+            step_loss: moving.map(|m| m.step_loss),
             halves: self.rounds.halves(),
             rounds: self.rounds.on_the_way(),
             ..Film::default()
@@ -298,36 +357,4 @@ impl ViewRun {
 
 fn quick(speed: Option<f64>, [width, height]: [usize; 2]) -> bool {
     speed.is_some_and(|per_ms| (width * height) as f64 / per_ms < QUICK_MS)
-}
-
-/// How far each cell is from anything that the plan wants to see; a byte is enough where nothing is skipped.
-fn distances(
-    context: &mut DeviceContext,
-    on_device: &DeviceVolume,
-    volume: &Volume,
-    plan: &mut ViewPlan,
-) -> Result<Option<Rc<Buffer>>> {
-    let [wide, high, deep] = on_device.cells.dims();
-    let values = match &plan.cells {
-        CellUse::Distances(values) => values,
-        CellUse::Ranges => return Ok(None),
-        CellUse::None => return context.device.upload(&vec![0; wide * high * deep], 0).map(|zero| Some(Rc::new(zero))),
-    };
-    // Raw values, rounded outwards.
-    let raw = |v: f64| (v - volume.inter()) / volume.slope();
-    let intervals: Vec<[f32; 2]> = values
-        .iter()
-        .map(|&[low, high]| {
-            let ends = [raw(low).min(raw(high)) as f32, raw(low).max(raw(high)) as f32];
-            [ends[0].next_down(), ends[1].next_up()]
-        })
-        .collect();
-    // Catmull-Rom's weights sum to 1 and their magnitudes to at most 1.25 along an axis: (1.25³ − 1) / 2 of the range.
-    let overshoot = if plan.variant.features.contains(&("INTERPOLATION", 3)) { 0.477 } else { 0.0 };
-    let distances = on_device.distances(&mut context.device, &intervals, overshoot)?;
-    let mut bytes = vec![0u8; wide * high * deep];
-    context.device.read(&distances, 0, &mut bytes)?;
-    let empty = bytes.iter().filter(|d| **d > 0).count();
-    plan.reasons.push(format!("{empty} of {} macro-cells are empty under it", bytes.len()));
-    Ok(Some(distances))
 }

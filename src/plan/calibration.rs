@@ -58,7 +58,7 @@ impl Calibration {
     }
 }
 
-/// The calibration, once it is needed: a server that plans nothing spends nothing on it.
+/// The calibration, once it is needed or asked for.
 #[derive(Debug)]
 pub struct Calibrations {
     file: PathBuf,
@@ -86,10 +86,12 @@ impl Calibrations {
         if let Some(kept) = kept.filter(|k| k.of == of) {
             return Ok(kept);
         }
+        let started = std::time::Instant::now();
         let mut factors = BTreeMap::new();
         for technique in TECHNIQUES {
             factors.insert(technique.to_owned(), measure(planner, technique).await?);
         }
+        tracing::info!(ms = started.elapsed().as_millis() as u64, "the device is calibrated");
         let found = Calibration { of, factors };
         // What cannot be kept is measured again next time.
         if let Err(error) =

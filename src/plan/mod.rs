@@ -110,6 +110,8 @@ impl Planner<'_> {
         if !body.is_object() {
             return Err(Error::invalid("", "not an object", "a JSON object such as a render's"));
         }
+        // One for all of its pilots.
+        let _place = self.engine.reserve()?;
         let family = Family::of(body);
         let scene = self.reference(body, family)?;
         let Subject::Volume(volume) = scene.subject() else {
@@ -163,6 +165,14 @@ impl Planner<'_> {
             features,
             request,
         })
+    }
+
+    /// Measures what is to be known of this device, unless that is known.
+    ///
+    /// # Errors
+    /// When a render fails.
+    pub async fn calibrate(&self) -> Result<()> {
+        self.calibrations.of(self).await.map(drop)
     }
 
     /// Every setting that could be chosen, whatever a bound says of it, in words and as a request; the first is the reference.

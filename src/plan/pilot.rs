@@ -109,9 +109,8 @@ impl Drop for CancelOnDrop<'_> {
 /// # Errors
 /// Those of the request.
 pub async fn finish(planner: &Planner<'_>, request: Value, apart: u32) -> Result<Run> {
-    let place = planner.engine.reserve()?;
     let scene = planner.scene(&request)?.into_pilot(apart);
-    let job = CancelOnDrop { engine: planner.engine, job: planner.engine.submit_pilot(place, request, scene) };
+    let job = CancelOnDrop { engine: planner.engine, job: planner.engine.submit_pilot(request, scene) };
     let job = &job.job;
     let ended = job.watch().wait_for(|u| u.state.is_terminal()).await.map(drop).map_err(Error::internal);
     let (state, film) = (job.state(), job.film());

@@ -148,3 +148,36 @@ async fn a_simulation_is_looked_at_while_it_fills_and_its_grid_is_a_nrrd() {
     let plain = api.finish(&small()).await;
     problem(api.get(plain["links"]["field"].as_str().unwrap()).await, 404, "the field of a render without one").await;
 }
+
+/// A picture that takes long: the first frames of a moving camera have less of it and say so, the ones at rest do not.
+#[tokio::test]
+async fn a_frame_in_motion_says_what_was_lowered_and_one_at_rest_has_it_all() {
+    let server = shared();
+    let api = Api::new(&server);
+    let heavy = json!({"technique": "emission_absorption", "volume": {"builtin": "smoke", "resolution": 128},
+        "emission_absorption": {"shading": true, "step_voxels": 0.06}, "image": {"width": 1024, "height": 1024}, "budget": {"samples": 500}});
+    let path = api.start(&heavy).await;
+    api.until(&path, "at rest", |r| {
+        r["samples"].as_u64() >= Some(1)
+            && r["trace"].as_array().is_some_and(|t| t.last().is_some_and(|p| p["stride"] == 1))
+    })
+    .await;
+    let mut lowered = Vec::new();
+    for step in 0..4 {
+        let eye = [3.0 * f64::from(step).sin(), 1.0, 3.0 * f64::from(step).cos()];
+        assert_eq!(api.put(&format!("{path}/camera"), &json!({"eye": eye})).await.status(), 200);
+        api.until(&path, "seen", |r| r["timings"]["first_frame_ms"].is_number()).await;
+        let frame = api.get(&format!("{path}/frame.png")).await;
+        lowered.extend(frame.headers().get("x-cloudchamber-lowered").map(|v| v.to_str().unwrap().to_owned()));
+        let error: f64 = frame.headers()["x-cloudchamber-error"].to_str().unwrap().parse().unwrap();
+        assert!(error > 0.0, "what was lowered is part of the error");
+    }
+    assert!(lowered.iter().any(|l| l.contains("resolution") || l.contains("step")), "{lowered:?}");
+    api.until(&path, "at rest again", |r| {
+        r["trace"].as_array().is_some_and(|t| t.last().is_some_and(|p| p["stride"] == 1))
+    })
+    .await;
+    let frame = api.get(&format!("{path}/frame.png")).await;
+    assert!(frame.headers().get("x-cloudchamber-lowered").is_none());
+    api.delete(&path).await;
+}

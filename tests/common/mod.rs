@@ -69,6 +69,7 @@ impl Server {
             .arg(data.path())
             .args(flags)
             .env("POCL_CACHE_DIR", kernel_cache())
+            .env("CLOUDCHAMBER_CALIBRATE", "false")
             .envs(environment.iter().copied())
             .stdout(Stdio::piped())
             .spawn()

@@ -1,0 +1,35 @@
+//! What of a picture was lowered so that it came in time.
+
+/// What a frame has less of than was asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lowered {
+    /// Pixels that a sample stands for, along a side.
+    pub apart: u32,
+    /// The step, of the one that was asked for.
+    pub step: f32,
+}
+
+impl Default for Lowered {
+    fn default() -> Self {
+        Self { apart: 1, step: 1.0 }
+    }
+}
+
+impl Lowered {
+    /// Whether nothing was.
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// In words, for a reader.
+    pub fn words(&self) -> Vec<String> {
+        let mut words = Vec::new();
+        if self.apart > 1 {
+            words.push(format!("resolution: one pixel in {}", self.apart * self.apart));
+        }
+        if self.step > 1.0 {
+            words.push(format!("step: {} times as long", self.step));
+        }
+        words
+    }
+}
