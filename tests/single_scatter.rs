@@ -68,8 +68,10 @@ fn choosing_places_by_angle_changes_the_noise_and_no_mean() {
         let film = film(House::shared(), &request);
         (mean(&film), film.error().noise.unwrap())
     };
-    let ((on, quiet), (off, loud)) = (run(true, 1), run(false, 2));
-    agree(on, off, "equiangular");
+    agree(run(true, 1).0, run(false, 2).0, "equiangular");
+    // Places near the light are rare without it, and bright: one picture's noise says little.
+    let noise = |equiangular: bool| (10..18).map(|seed| run(equiangular, seed).1.powi(2)).sum::<f64>().sqrt();
+    let (quiet, loud) = (noise(true), noise(false));
     assert!(quiet < 0.5 * loud, "noise {quiet} with it, {loud} without");
 }
 

@@ -31,10 +31,7 @@ impl Film {
         let noise = match self.main.count {
             // Of noise a 2×2 block's mean takes a quarter of the variance away.
             0 | 1 => self.noisy.then(|| self.main.resolution_error() * (4.0f64 / 3.0).sqrt()),
-            n => {
-                let random = self.random_noise();
-                Some(self.halves.and_then(|h| h.noise(n, random)).unwrap_or(random))
-            }
+            _ => Some(self.spread_noise().unwrap_or_else(|| self.random_noise().0)),
         };
         let truncation = self.truncation();
         let (discretisation, joint) = match (&self.control, self.main.stride) {
@@ -59,10 +56,20 @@ impl Film {
         }
     }
 
-    /// The standard error of the mean over random samples, of luminance: root mean square over the pixels.
-    pub(crate) fn random_noise(&self) -> f64 {
+    /// The standard error of the mean over random samples, of luminance, root mean square over the pixels; and how many pixels it is of:
+    /// (Σ sᵢ²)² / Σ sᵢ⁴.
+    pub(crate) fn random_noise(&self) -> (f64, f64) {
         let squared = |i: usize| Some(self.main.squared_error(i)).filter(|e| e.is_finite()).unwrap_or(0.0);
-        ((0..self.main.pixels()).map(squared).sum::<f64>() / self.main.pixels().max(1) as f64).sqrt()
+        let add = |(sum, squares): (f64, f64), s: f64| (sum + s, squares + s * s);
+        let (sum, squares) = (0..self.main.pixels()).map(squared).fold((0.0, 0.0), add);
+        ((sum / self.main.pixels().max(1) as f64).sqrt(), if squares > 0.0 { sum * sum / squares } else { 0.0 })
+    }
+
+    /// The noise where the samples are spread better than random ones.
+    pub(crate) fn spread_noise(&self) -> Option<f64> {
+        let halves = self.halves?;
+        let (random, pixels) = self.random_noise();
+        halves.noise(self.main.count, random, pixels)
     }
 
     /// The difference to the control, whose step is twice as long. A method of first order or better is at most this wrong:

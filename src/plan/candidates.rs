@@ -60,6 +60,8 @@ pub struct Candidate {
     pub technique: String,
     /// Its own parameters.
     pub own: Value,
+    /// The lights that it has, where they are not all that are given.
+    pub lights: Option<Value>,
     /// What it is, in words.
     pub words: String,
     /// Whether more samples take all of its error away.
@@ -76,7 +78,38 @@ impl Candidate {
             }
         }
         request[self.technique.as_str()] = self.own.clone();
+        if let (Some(fewer), Some(lights)) = (&self.lights, lights_mut(&mut request)) {
+            *lights = fewer.clone();
+        }
         request
+    }
+
+    /// The same without some of the lights.
+    fn without(&self, given: &Value, faint: &[usize]) -> Self {
+        let all = given.as_array().cloned().unwrap_or_default();
+        let kept = all.into_iter().enumerate().filter(|(i, _)| !faint.contains(i)).map(|(_, light)| light);
+        let which = if faint.len() == 1 {
+            "light that hardly reaches".into()
+        } else {
+            format!("{} lights that hardly reach", faint.len())
+        };
+        let words = format!("{}, without the {which}", self.words);
+        Self { lights: Some(kept.collect()), words, unbiased: false, ..self.clone() }
+    }
+}
+
+/// The lights of a request of a scattering view, where they are given: beside the volume, or among its own parameters.
+pub fn lights(request: &Value) -> Option<&Value> {
+    let own = || request.get(request["technique"].as_str()?)?.get("lights");
+    request.get("lights").or_else(own)
+}
+
+fn lights_mut(request: &mut Value) -> Option<&mut Value> {
+    let technique = request["technique"].as_str()?.to_owned();
+    if request.get("lights").is_some() {
+        request.get_mut("lights")
+    } else {
+        request.get_mut(technique)?.get_mut("lights")
     }
 }
 
@@ -90,7 +123,7 @@ pub fn with_technique(body: &Value, technique: &str) -> Value {
 /// The setting that stands for the truth of the others.
 pub fn reference(body: &Value, family: Family) -> Candidate {
     match family {
-        Family::Stepping(name) => stepping(body, name).swap_remove(0),
+        Family::Stepping(name) => stepping(body, name, false).swap_remove(0),
         Family::Scattering => every_path(body),
     }
 }
@@ -98,7 +131,7 @@ pub fn reference(body: &Value, family: Family) -> Candidate {
 /// The candidates, the first of which is the reference, and those that a bound rules out.
 pub fn candidates(body: &Value, family: Family, features: &Features, error: f64) -> (Vec<Candidate>, Vec<Considered>) {
     match family {
-        Family::Stepping(name) => (stepping(body, name), Vec::new()),
+        Family::Stepping(name) => (stepping(body, name, features.homogeneous), Vec::new()),
         Family::Scattering => scattering(body, features, error),
     }
 }
@@ -107,14 +140,15 @@ fn given(body: &Value, technique: &str) -> Map<String, Value> {
     body.get(technique).and_then(Value::as_object).cloned().unwrap_or_default()
 }
 
-fn stepping(body: &Value, name: &str) -> Vec<Candidate> {
+/// `flat` where there is no gradient for shading to show.
+fn stepping(body: &Value, name: &str, flat: bool) -> Vec<Candidate> {
     let own = given(body, name);
     let schema = technique::find(name).map(|t| (t.schema)()).unwrap_or_default();
     let open = |field: &str| schema["properties"].get(field).is_some() && !own.contains_key(field);
     let of = |more: &[(&str, Value)], words: String, unbiased: bool| {
         let mut own = own.clone();
         own.extend(more.iter().map(|(k, v)| ((*k).to_owned(), v.clone())));
-        Candidate { technique: name.into(), own: Value::Object(own), words, unbiased }
+        Candidate { technique: name.into(), own: Value::Object(own), lights: None, words, unbiased }
     };
     if !open("step_voxels") {
         return vec![of(&[], format!("{name} as it is given"), true)];
@@ -134,6 +168,13 @@ fn stepping(body: &Value, name: &str) -> Vec<Candidate> {
     }
     let reference =
         of(&[("step_voxels", json!(STEPS[STEPS.len() - 1] / 2.0))], format!("{name}, the shortest step"), true);
+    if flat && own.get("shading") == Some(&json!(true)) {
+        let unshaded = |step: &f64| {
+            let more = [("step_voxels", json!(step)), ("shading", json!(false))];
+            of(&more, format!("{name}, step of {step} voxels, unshaded"), false)
+        };
+        all.extend(STEPS.iter().map(unshaded));
+    }
     all.insert(0, reference);
     all
 }
@@ -157,12 +198,14 @@ fn every_path(body: &Value) -> Candidate {
         Some("single_scatter") => Candidate {
             technique: "single_scatter".into(),
             own,
+            lights: None,
             words: "single_scatter, as asked".into(),
             unbiased: true,
         },
         _ => Candidate {
             technique: "volume_path".into(),
             own,
+            lights: None,
             words: "volume_path, every scattering".into(),
             unbiased: true,
         },
@@ -174,7 +217,7 @@ fn scattering(body: &Value, features: &Features, error: f64) -> (Vec<Candidate>,
     let of = |technique: &str, more: &[(&str, Value)], words: String| {
         let mut own = own.clone();
         own.extend(more.iter().map(|(k, v)| ((*k).to_owned(), v.clone())));
-        Candidate { technique: technique.into(), own: Value::Object(own), words, unbiased: false }
+        Candidate { technique: technique.into(), own: Value::Object(own), lights: None, words, unbiased: false }
     };
     let mut all = vec![every_path(body)];
     let mut ruled_out = Vec::new();
@@ -201,6 +244,11 @@ fn scattering(body: &Value, features: &Features, error: f64) -> (Vec<Candidate>,
         let limit = [("max_scatterings", json!(scatterings))];
         let more = if scatterings == 1 { &[][..] } else { &limit[..] };
         all.push(of(technique, more, words));
+    }
+    let faint = features.faint_lights(error);
+    if let Some(given) = lights(&all[0].request(body)).filter(|_| super::is_auto(body) && !faint.is_empty()) {
+        let fewer: Vec<Candidate> = all.iter().map(|c| c.without(given, &faint)).collect();
+        all.extend(fewer);
     }
     (all, ruled_out)
 }

@@ -3,9 +3,11 @@
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::scene::Scene;
+use super::candidates;
 use crate::scene::depth::greatest_along_axes;
+use crate::scene::lights::{LightSource, Lights};
 use crate::scene::medium::MediumRequest;
+use crate::scene::{Scene, radius};
 use crate::technique::slab::missing;
 use crate::volume::Volume;
 
@@ -21,6 +23,8 @@ pub struct Features {
     /// What of the light that a slab of the volume's least depth sends back was scattered more than once: the bound by which multiple
     /// scattering may be left out.
     pub multiple_scattering: Option<f64>,
+    /// What part each light but a sky has of the light in the middle of the volume, with its place in the request.
+    pub light_shares: Vec<(usize, f64)>,
     /// Sides of the smallest voxel over the side of a pixel where the volume's middle is.
     pub pixels_per_voxel: f64,
 }
@@ -40,6 +44,7 @@ impl Features {
             optical_depth: depth,
             albedo,
             multiple_scattering: least.zip(albedo).map(|(depth, albedo)| missing(depth, albedo, 1)),
+            light_shares: light_shares(volume, request),
             pixels_per_voxel: pixels_per_voxel(scene, volume),
         }
     }
@@ -48,6 +53,19 @@ impl Features {
     pub fn missing(&self, scatterings: u32) -> f64 {
         let least = self.optical_depth.map_or(0.0, |d| d.into_iter().fold(f64::INFINITY, f64::min));
         missing(least, self.albedo.unwrap_or(0.0), scatterings)
+    }
+
+    /// The lights, by their places in the request, that together have at most `part` of the light in the middle.
+    pub fn faint_lights(&self, part: f64) -> Vec<usize> {
+        let mut shares = self.light_shares.clone();
+        shares.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let sums = shares.iter().scan(0.0, |sum, (i, share)| {
+            *sum += share;
+            Some((*i, *sum))
+        });
+        let mut faint: Vec<usize> = sums.take_while(|(_, sum)| *sum <= part).map(|(i, _)| i).collect();
+        faint.sort_unstable();
+        faint
     }
 
     /// In words, for a reader.
@@ -76,6 +94,14 @@ fn medium(request: &Value) -> Option<MediumRequest> {
     }
     let given = request.get("medium").or_else(|| request[technique].get("medium"));
     given.map_or_else(|| Some(MediumRequest::default()), |m| serde_json::from_value(m.clone()).ok())
+}
+
+fn light_shares(volume: &Volume, request: &Value) -> Vec<(usize, f64)> {
+    let given = candidates::lights(request).and_then(|l| serde_json::from_value::<Vec<LightSource>>(l.clone()).ok());
+    let lights = given.and_then(|sources| Lights::from_request(Some(&sources), "/lights").ok());
+    let shares = lights.map(|l| (l.shares(radius(volume)), l));
+    let aimed = shares.map(|(shares, l)| shares.into_iter().enumerate().filter(move |(i, _)| !l.is_sky(*i)).collect());
+    aimed.unwrap_or_default()
 }
 
 fn pixels_per_voxel(scene: &Scene, volume: &Volume) -> f64 {

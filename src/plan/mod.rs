@@ -233,7 +233,7 @@ fn budget(best: &Pilot, samples: u32, enough: bool, wish: Wish) -> Value {
         && room > 0.0
         && samples >= FEW
     {
-        budget["max_error"] = json!(room.sqrt());
+        budget["max_error"] = json!(room.sqrt() / best.chance);
     }
     if let Some(time) = wish.time_ms {
         budget["time_ms"] = json!(time as u64);

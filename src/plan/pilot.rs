@@ -27,6 +27,8 @@ const CONFIRMED: u32 = 4;
 /// A picture of which a sample takes less, ms, is timed so often.
 const SHORT: f64 = 20.0;
 const REPEATS: usize = 3;
+/// Deviations that one in twenty is beyond, on one side.
+const ONE_IN_TWENTY: f64 = 1.645;
 /// Groups of pixels of which the spread tells how well a bias is known.
 const GROUPS: usize = 16;
 
@@ -37,6 +39,8 @@ pub struct Pilot {
     pub candidate: Candidate,
     /// The noise after so many samples, relative; one entry where it is that of random samples.
     pub noise: Vec<(u32, f64)>,
+    /// How much more than the noise a picture may be wrong by chance.
+    pub chance: f64,
     /// What more samples do not take away, relative,
     pub bias: f64,
     /// and how much larger it might be.
@@ -71,12 +75,18 @@ impl Run {
 
     /// The noise as a pilot has it, relative to `scale`.
     fn noise(&self, scale: f64) -> Vec<(u32, f64)> {
-        let (count, random) = (self.film.main.count, self.film.random_noise());
-        if self.film.halves.and_then(|h| h.noise(count, random)).is_none() {
-            return vec![(count, random / scale)];
+        if self.film.spread_noise().is_none() {
+            return vec![(self.film.main.count, self.film.random_noise().0 / scale)];
         }
         curve(&self.film.rounds).into_iter().map(|(n, e)| (n, e / scale)).collect()
     }
+}
+
+/// What a picture may be wrong by over its noise, in 19 of 20: the square of the error has a relative variance of 2/ν, where ν are the
+/// pixels that matter, and so has what `samples` of each know of it, over the samples.
+fn chance(pixels: f64, samples: u32) -> f64 {
+    let variance = 2.0 / pixels.max(1.0) * (1.0 + 1.0 / (f64::from(samples) - 1.0).max(1.0));
+    (1.0 + ONE_IN_TWENTY * variance.sqrt()).sqrt()
 }
 
 /// What the first half of the rounds were wrong by, of luminance.
@@ -172,6 +182,8 @@ pub async fn run_all(
         pilots.push(Pilot {
             candidate: candidate.clone(),
             noise: runs[0].noise(scale),
+            // There are more pixels in the picture, of the same kinds.
+            chance: chance(runs[0].film.random_noise().1 * f64::from(apart * apart), SAMPLES),
             bias,
             bias_within,
             ms_per_sample: runs[0].ms[1].min(runs[1].ms[1]) / runs[0].pixels as f64,
@@ -237,7 +249,8 @@ pub async fn confirm(planner: &Planner<'_>, body: &Value, pilots: &mut [Pilot], 
     };
     let (found, whole) = (&runs[0], [median(0), median(1)]);
     if pilot.is_random() {
-        pilots[index].noise = vec![(found.film.main.count, found.film.random_noise() / found.mean())];
+        let ((noise, pixels), count) = (found.film.random_noise(), found.film.main.count);
+        (pilots[index].noise, pilots[index].chance) = (vec![(count, noise / found.mean())], chance(pixels, count));
     } else {
         let seen = first_step(&found.film.rounds) / found.mean();
         let more = if seen > 0.0 && pilot.first_step > 0.0 { seen / pilot.first_step } else { 1.0 };

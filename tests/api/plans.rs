@@ -151,3 +151,46 @@ async fn a_client_that_goes_away_takes_its_pilots_along() {
     }
     assert_eq!(api.get_json("/v1/renders").await["renders"], json!([]));
 }
+
+#[tokio::test]
+async fn lights_that_hardly_reach_may_go_and_others_not() {
+    let server = shared();
+    let api = Api::new(&server);
+    let lit = |intensity: f64| {
+        let lights = json!([{"type": "sun"}, {"type": "point", "position": [30, 5, 0], "intensity": intensity}, {"type": "sky", "radiance": 0.1}]);
+        with(fog(3.0, 0.8, &json!({"max_error": 0.05})), "/lights", lights)
+    };
+    let dropped = |plan: &Value| -> Option<Value> {
+        let all = plan["considered"].as_array().unwrap();
+        all.iter()
+            .find(|c| c["words"] == "volume_path, every scattering, without the light that hardly reaches")
+            .cloned()
+    };
+    let faint = plan(&api, &lit(0.1)).await;
+    let without = dropped(&faint).unwrap();
+    assert_eq!(without["enough"], true, "{without}");
+    assert!(without["bias"].as_f64() < Some(0.02), "{without}");
+    assert!(dropped(&plan(&api, &lit(3000.0)).await).is_none(), "three times the sun is not faint");
+    // A plan without it can be posted: the light is gone from where it was given.
+    let posted = &faint["request"];
+    if faint["reasons"].to_string().contains("without the light") {
+        assert_eq!(posted["lights"].as_array().map(Vec::len), Some(2));
+    }
+    assert_eq!(api.finish(posted).await["state"], "done");
+}
+
+#[tokio::test]
+async fn shading_goes_where_nothing_has_a_gradient() {
+    let server = shared();
+    let api = Api::new(&server);
+    let shaded = |volume: &str| {
+        json!({"technique": "auto", "volume": {"builtin": volume, "resolution": 32}, "emission_absorption": {"shading": true},
+            "image": {"width": 96, "height": 72}, "budget": {"max_error": 0.05}})
+    };
+    let unshaded = |plan: &Value| {
+        plan["considered"].as_array().unwrap().iter().any(|c| c["words"].as_str().unwrap().contains("unshaded"))
+    };
+    let flat = plan(&api, &shaded("constant")).await;
+    assert!(unshaded(&flat), "{flat}");
+    assert!(!unshaded(&plan(&api, &shaded("sphere")).await), "a surface is not flat");
+}

@@ -144,7 +144,8 @@ fn beside_voxels_that_are_not_a_number_the_rest_is_as_it_is() {
             let run = |other: f64, seed: u64| {
                 let own = json!({"medium": {"sigma_t_per_unit": 3}, "lights": sun, "tracking": tracking, "interpolation": "nearest"});
                 let camera = json!({"eye": [3.0, 0.5, 1.0], "up": [0, 1, 0], "fov_y_deg": 30});
-                let mut request = scene(technique, &half(other), &camera, &own, 32, 64);
+                // Of 48² pixels the mean of z² has a deviation of 0.03: 1.15 is not reached by chance.
+                let mut request = scene(technique, &half(other), &camera, &own, 48, 64);
                 request["seed"] = json!(seed);
                 let job = House::shared().finish(&request);
                 assert_eq!(job.resource()["counts"]["broken_majorants"], 0, "{technique} {tracking}");
