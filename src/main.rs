@@ -296,10 +296,12 @@ fn run_studies(args: &StudyArgs) -> Result<()> {
     }
     if asked(PLANNER) {
         let scenes = args.scenes.clone().unwrap_or(0..scale.pick(10, 100));
-        let found = study::planner::planner(&bench, scenes, &mut told)?;
-        let ([met, timed, cheap], n) = (found.figures(), found.scenes.len());
-        println!("of {n} plans {met} meet the error, {timed} the time, {cheap} the cost");
-        shelf.put_planned(&found)?;
+        for scene in scenes {
+            // Each is written at once: all of them take long.
+            let all = shelf.put_planned(study::planner::planner(&bench, scene..scene + 1, &mut told)?)?;
+            let ([met, timed, cheap], n) = (all.figures(), all.scenes.len());
+            told(&format!("of {n} plans {met} meet the error, {timed} the time, {cheap} the cost"));
+        }
     }
     println!("written to {}", shelf.folder().display());
     Ok(())

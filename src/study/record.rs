@@ -28,6 +28,13 @@ pub struct Machine {
     pub unix_s: u64,
 }
 
+impl Machine {
+    /// Whether it is the same but for the time.
+    pub fn is_same(&self, other: &Self) -> bool {
+        Self { unix_s: other.unix_s, ..self.clone() } == *other
+    }
+}
+
 /// One study: a case with its settings measured.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Record {

@@ -98,13 +98,21 @@ impl Shelf {
         Ok(())
     }
 
-    /// Puts the planner's figures and their page in the folder.
+    /// Puts the planner's figures and their page in the folder, beside those of other scenes that the same program has had on the same
+    /// machine. Returns all of them.
     ///
     /// # Errors
     /// As [`Shelf::put`].
-    pub fn put_planned(&self, found: &Planned) -> Result<()> {
-        self.write("planner.json", &json(found)?)?;
-        self.write("planner.md", &found.page())
+    pub fn put_planned(&self, mut found: Planned) -> Result<Planned> {
+        if let Some(old) = self.record::<Planned>(PLANNER).filter(|old| old.machine.is_same(&found.machine)) {
+            let again = |o: &super::planner::Outcome| found.scenes.iter().any(|new| new.scene == o.scene);
+            let kept: Vec<_> = old.scenes.into_iter().filter(|o| !again(o)).collect();
+            found.scenes.extend(kept);
+            found.scenes.sort_by_key(|o| o.scene);
+        }
+        self.write("planner.json", &json(&found)?)?;
+        self.write("planner.md", &found.page())?;
+        Ok(found)
     }
 
     fn write(&self, file: &str, text: &str) -> Result<()> {
