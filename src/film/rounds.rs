@@ -3,7 +3,7 @@
 /// Halves that differ by less than this part of what random ones would are not random,
 const WELL_SPREAD: f64 = 0.9;
 /// if that is not by chance: by so many deviations of the square of what random ones would differ by.
-const DEVIATIONS: f64 = 4.0;
+pub(crate) const SURE: f64 = 4.0;
 
 /// Whether a picture is looked at after so many samples: 1, 2, 3, 4, 6, 8, 12, …
 pub(crate) fn is_round(samples: u32) -> bool {
@@ -49,9 +49,9 @@ impl Halves {
     /// The noise after `samples` of which random ones would have `random`, where that is clearly less; more samples are taken to be
     /// random. Of random halves the square is `random`² on average, with a relative variance of 2/ν, where the `pixels` that matter,
     /// ν = (Σ sᵢ²)² / Σ sᵢ⁴, may be few: those that a firefly met.
-    pub fn noise(&self, samples: u32, random: f64, pixels: f64) -> Option<f64> {
+    pub fn noise(&self, samples: u32, random: f64, pixels: f64, deviations: f64) -> Option<f64> {
         let noise = self.apart * (f64::from(self.samples) / f64::from(samples)).sqrt();
-        let by_chance = 1.0 - DEVIATIONS * (2.0 / pixels.max(1.0)).sqrt();
+        let by_chance = 1.0 - deviations * (2.0 / pixels.max(1.0)).sqrt();
         (noise < WELL_SPREAD * random && noise * noise < by_chance * random * random).then_some(noise)
     }
 }
@@ -82,7 +82,7 @@ mod tests {
         let golden = |n: u32, _| (0.5 + f64::from(n) * 0.618_033_988_75).fract();
         for n in [32, 128, 512] {
             let (half, all) = (edges(n / 2, golden), edges(n, golden));
-            let told = Halves::of(&half, &all).noise(n, random(n), 2000.0);
+            let told = Halves::of(&half, &all).noise(n, random(n), 2000.0, SURE);
             let wrong = all.apart(&truth());
             assert!(told.is_some_and(|t| t >= wrong && t < 3.0 * wrong), "{n}: {told:?} of {wrong}");
         }
@@ -93,13 +93,13 @@ mod tests {
         };
         let halves = Halves::of(&edges(16, hash), &edges(32, hash));
         assert_eq!(
-            halves.noise(32, random(32), 2000.0),
+            halves.noise(32, random(32), 2000.0, SURE),
             None,
             "of random ones the samples' own variance is better: {halves:?}"
         );
         assert!((halves.apart / random(32) - 1.0).abs() < 0.1, "{halves:?}");
 
         let lucky = Halves { samples: 32, apart: 0.8 * random(32) };
-        assert_eq!(lucky.noise(32, random(32), 10.0), None, "of ten pixels that matter this says nothing");
+        assert_eq!(lucky.noise(32, random(32), 10.0, SURE), None, "of ten pixels that matter this says nothing");
     }
 }

@@ -7,8 +7,9 @@ use crate::power_law::PowerLaw;
 
 /// What a plan aims at, of the error asked for: besides what chance does, estimates are off by a percent or two.
 pub(super) const AIM: f64 = 0.98;
-/// Samples from which on places in a pixel are balanced about its centre (`job/places.rs`).
-const BALANCED: u32 = 4;
+/// Samples from which on the places in a pixel are many enough for a power law (`job/places.rs`), and points that it needs.
+const MANY: u32 = 8;
+const POINTS: usize = 4;
 /// About nine of ten device times are within this factor of the predicted one.
 const TIME_FACTOR: f64 = 1.5;
 /// And errors.
@@ -46,8 +47,9 @@ impl Pilot {
         if self.is_random() {
             return error * (f64::from(*last) / samples).sqrt();
         }
-        let balanced = self.noise.iter().filter(|(n, _)| *n >= BALANCED).map(|(n, e)| (f64::from(*n), *e));
-        let law = PowerLaw::through(&balanced.collect::<Vec<_>>());
+        let many: Vec<(f64, f64)> =
+            self.noise.iter().filter(|(n, _)| *n >= MANY).map(|(n, e)| (f64::from(*n), *e)).collect();
+        let law = PowerLaw::through(&many).filter(|_| many.len() >= POINTS);
         let trend = |n: f64| law.map_or(0.0, |l| l.at(n));
         let last = f64::from(*last);
         if samples >= last {
@@ -58,7 +60,7 @@ impl Pilot {
             return trend(last).max(*error) * (samples / last).powf(power);
         }
         let on_curve = self.on_curve(samples);
-        if samples < f64::from(BALANCED) { on_curve } else { trend(samples).max(on_curve) }
+        if samples < f64::from(MANY) { on_curve } else { trend(samples).max(on_curve) }
     }
 
     /// Between the numbers of samples that were looked at.

@@ -27,6 +27,8 @@ const CONFIRMED: u32 = 4;
 /// A picture of which a sample takes less, ms, is timed so often.
 const SHORT: f64 = 20.0;
 const REPEATS: usize = 3;
+/// Deviations by which halves must agree better than random ones would before the curve is looked at: it is right of random ones too.
+const BY_CHANCE: f64 = 0.0;
 /// Deviations that one in twenty is beyond, on one side.
 const ONE_IN_TWENTY: f64 = 1.645;
 /// Groups of pixels of which the spread tells how well a bias is known.
@@ -75,7 +77,7 @@ impl Run {
 
     /// The noise as a pilot has it, relative to `scale`.
     fn noise(&self, scale: f64) -> Vec<(u32, f64)> {
-        if self.film.spread_noise().is_none() {
+        if self.film.spread_noise(BY_CHANCE).is_none() {
             return vec![(self.film.main.count, self.film.random_noise().0 / scale)];
         }
         curve(&self.film.rounds).into_iter().map(|(n, e)| (n, e / scale)).collect()

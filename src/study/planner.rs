@@ -14,8 +14,8 @@ use crate::error::Result;
 /// What a plan may cost over the cheapest setting that would have done, and a time over the predicted one or under it.
 const COST_FACTOR: f64 = 1.3;
 const TIME_FACTOR: f64 = 1.5;
-/// The truth's noise, of the error asked for.
-const TRUTH_NOISE: f64 = 0.25;
+/// The truth's noise, of the error asked for: of evenly spread samples, and of random ones, whose noise is known and taken off.
+const TRUTH_NOISE: [f64; 2] = [0.25, 0.5];
 /// The most samples that are tried by force, and that a truth has.
 const MOST_SAMPLES: u64 = 4096;
 const MOST_TRUTH: u64 = 16_384;
@@ -212,12 +212,12 @@ fn truth(bench: &Bench, reference: &Value, asked: f64) -> Result<Known> {
     if random {
         request["volume_path"]["tracking"] = json!("weighted");
     }
-    let mut samples = 16;
+    let (mut samples, most) = (16, TRUTH_NOISE[usize::from(random)] * asked);
     loop {
         let run = bench.run(&with_samples(&request, samples), Reads::Blocks(2))?;
         let noise = 0.5 * run.reply.pointer("/error_parts/noise").and_then(Value::as_f64).unwrap_or(0.0);
-        let needed = (samples as f64 * (noise / (TRUTH_NOISE * asked)).powi(2)).ceil() as u64;
-        if noise <= TRUTH_NOISE * asked || samples >= MOST_TRUTH {
+        let needed = (samples as f64 * (noise / most).powi(2)).ceil() as u64;
+        if noise <= most || samples >= MOST_TRUTH {
             let mean = run.values.iter().sum::<f64>() / run.values.len() as f64;
             // What the halves of evenly spread samples differ by is more than their noise: to take it off would flatter the plan.
             return Ok(Known { values: run.values, mean, noise: if random { noise } else { 0.0 } });
