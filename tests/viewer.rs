@@ -216,3 +216,15 @@ async fn the_charts_page_shows_what_was_measured() {
     assert_eq!(page.text("#alert").await, "");
     page.close().await;
 }
+
+/// With the box ticked the planner chooses, and the page says what and why; without, nothing is planned.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_ticked_box_leaves_the_settings_to_the_planner() {
+    let page = Page::open(DESKTOP).await;
+    page.settled().await;
+    page.js("document.querySelector('#planned').click()").await;
+    page.until("a plan", "document.querySelector('#plan').textContent.includes('on the device')").await;
+    page.settled().await;
+    assert!(page.text("#plan").await.contains("sample"), "{}", page.text("#plan").await);
+    page.close().await;
+}

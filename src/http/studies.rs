@@ -9,8 +9,9 @@ use serde_json::{Value, json};
 use super::App;
 use super::problem::Id;
 use crate::error::{Error, Result};
+use crate::study::planner::Planned;
 use crate::study::record::Record;
-use crate::study::shelf::{STABILITY, Shelf};
+use crate::study::shelf::{PLANNER, STABILITY, Shelf};
 use crate::study::stability::Stability;
 use crate::study::{CASES, Case};
 
@@ -20,7 +21,8 @@ const ROOT: &str = "/v1/studies";
 pub(super) async fn list(State(app): State<App>) -> Result<Json<Value>> {
     let listed = tokio::task::spawn_blocking(move || {
         let cases: Vec<Value> = CASES.iter().filter_map(|c| describe(c, &app.studies)).collect();
-        json!({"studies": cases, "stability": app.studies.record(STABILITY).as_ref().map(describe_stability)})
+        json!({"studies": cases, "stability": app.studies.record(STABILITY).as_ref().map(describe_stability),
+            "planner": app.studies.record(PLANNER).as_ref().map(describe_planner)})
     });
     Ok(Json(listed.await.map_err(Error::internal)?))
 }
@@ -45,6 +47,12 @@ fn describe_stability(found: &Stability) -> Value {
     });
     json!({"href": format!("{ROOT}/{STABILITY}"),
         "experiments": experiments.collect::<Vec<_>>(), "not_here_yet": found.not_here_yet})
+}
+
+fn describe_planner(found: &Planned) -> Value {
+    let [error_met, in_time, cheap] = found.figures();
+    json!({"href": format!("{ROOT}/{PLANNER}"), "machine": found.machine, "scenes": found.scenes.len(),
+        "error_met": error_met, "in_time": in_time, "cheap": cheap})
 }
 
 /// `GET /v1/studies/{id}`: its numbers; `{id}.svg`: its chart.

@@ -35,6 +35,12 @@ async fn what_was_measured_is_served_as_numbers_and_as_charts() {
         assert!(!verdict.contains("silent"), "{}: {verdict}", experiment["name"]);
         all.extend(charts(experiment));
     }
+    let planner = &listed["planner"];
+    assert!(
+        planner["error_met"].as_u64() <= planner["scenes"].as_u64() && planner["scenes"].as_u64() > Some(0),
+        "{planner}"
+    );
+    assert!(api.get_json(planner["href"].as_str().unwrap()).await["scenes"].is_array());
     assert!(api.get_json(stability["href"].as_str().unwrap()).await["experiments"].is_array());
     for chart in all {
         let response = api.get(&chart).await;
