@@ -83,7 +83,7 @@ const OPERATIONS: &[Operation] = &[
     },
     get(
         "/v1/renders/{id}/frames",
-        "The frames as they come, each with X-Cloudchamber-{Samples,Error,Elapsed-Ms,Final}; ends after the final one",
+        "The frames as they come, each with X-Cloudchamber-{Samples,Error,Elapsed-Ms,Final}, and with -Lowered where a moving camera has less than was asked for; ends after the final one",
         &[(200, "multipart/x-mixed-replace", "PNG frames")],
         &[404, 429],
     ),

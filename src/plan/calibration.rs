@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use tokio::sync::OnceCell;
 
-use super::{Planner, pilot};
+use super::{Planner, run};
 use crate::error::Result;
 
 /// Techniques that are calibrated: one a family.
@@ -110,7 +110,7 @@ async fn measure(planner: &Planner<'_>, technique: &str) -> Result<Factors> {
         for seed in 0..4 {
             let request = json!({"technique": technique, "volume": {"builtin": "smoke", "resolution": 64}, "seed": seed,
                 "image": {"width": LARGE, "height": LARGE}, "budget": {"samples": SAMPLES}});
-            let run = pilot::finish(planner, request, apart).await?;
+            let run = run::finish(planner, request, apart).await?;
             least = [least[0].min(run.ms[0]), least[1].min(run.ms[1] / run.pixels as f64)];
         }
         Ok(least)

@@ -54,9 +54,7 @@ impl Pilot {
         let last = f64::from(*last);
         if samples >= last {
             // Beyond it not faster than evenly spread places can, nor more slowly than random ones.
-            let power = law
-                .filter(|_| !self.hopeful)
-                .map_or(if self.hopeful { -1.0 } else { -0.5 }, |l| l.power.clamp(-1.0, -0.5));
+            let power = if self.hopeful { -1.0 } else { law.map_or(-0.5, |l| l.power.clamp(-1.0, -0.5)) };
             return trend(last).max(*error) * (samples / last).powf(power);
         }
         let on_curve = self.on_curve(samples);

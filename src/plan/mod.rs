@@ -1,16 +1,19 @@
 //! The planner: model no more than a scene needs.
 //!
 //! A request says what is looked at and how wrong the picture may be or how long it may take. From the scene's [`features`] come the
-//! settings that could do (`candidates`), less those that a bound rules out; a `pilot` of a few thousand pixels measures what each of the
-//! rest costs here and is wrong by; `choose` takes the cheapest that is enough, or the best that is in time, and says why in words.
+//! settings that could do (`candidates`), less those that a bound rules out; a `pilot` of a few thousand pixels of the picture itself
+//! measures what each of the rest costs here and is wrong by, deeper where that might be the best, and the likely one is confirmed on the
+//! whole picture; `choose` takes the cheapest that is enough, or the best that is in time, and says why in words.
 //!
-//! What grows how is what the study measured: noise falls as the root of the samples, time is linear in samples and pixels.
+//! What grows how is what the study measured: random noise falls as the root of the samples, that of evenly spread ones by a power between
+//! ½ and 1; time is linear in samples and pixels.
 
 mod calibration;
 mod candidates;
 mod choose;
 pub mod features;
 mod pilot;
+mod run;
 
 use serde::Serialize;
 use serde_json::{Value, json};

@@ -6,15 +6,12 @@
 //! ones, as the places in a pixel and in a step are, it is looked up on the curve of the pilot: what its picture after n samples differs by
 //! from that after N, with |I_n − I_N|² ≈ e_n² (1 − n/N), which is what random samples have.
 
-use std::sync::Arc;
-
 use serde_json::{Value, json};
 
 use super::Planner;
 use super::candidates::Candidate;
+use super::run::{Run, curve, finish, mean};
 use crate::error::{Error, Result};
-use crate::film::{Film, Round};
-use crate::job::{Engine, Job, State};
 
 /// Pixels of a pilot, about.
 const PIXELS: f64 = 4096.0;
@@ -27,8 +24,6 @@ const CONFIRMED: u32 = 4;
 /// A picture of which a sample takes less, ms, is timed so often.
 const SHORT: f64 = 20.0;
 const REPEATS: usize = 3;
-/// Deviations by which halves must agree better than random ones would before the curve is looked at: it is right of random ones too.
-const BY_CHANCE: f64 = 0.0;
 /// Deviations that one in twenty is beyond, on one side.
 const ONE_IN_TWENTY: f64 = 1.645;
 /// Groups of pixels of which the spread tells how well a bias is known.
@@ -57,33 +52,6 @@ pub struct Pilot {
     pub whole: Option<[f64; 2]>,
 }
 
-/// A finished pilot render.
-pub struct Run {
-    film: Arc<Film>,
-    /// Pixels.
-    pub pixels: usize,
-    /// Device time besides the samples, and of a sample, ms.
-    pub ms: [f64; 2],
-}
-
-impl Run {
-    fn luminance(&self, pixel: usize) -> f64 {
-        self.film.main.luminance(pixel)
-    }
-
-    fn mean(&self) -> f64 {
-        mean((0..self.pixels).map(|i| self.luminance(i))).abs().max(f64::MIN_POSITIVE)
-    }
-
-    /// The noise as a pilot has it, relative to `scale`.
-    fn noise(&self, scale: f64) -> Vec<(u32, f64)> {
-        if self.film.spread_noise(BY_CHANCE).is_none() {
-            return vec![(self.film.main.count, self.film.random_noise().0 / scale)];
-        }
-        curve(&self.film.rounds).into_iter().map(|(n, e)| (n, e / scale)).collect()
-    }
-}
-
 /// What a picture may be wrong by over its noise, in 19 of 20: the square of the error has a relative variance of 2/ν, where ν are the
 /// pixels that matter, and so has what `samples` of each know of it, over the samples.
 fn chance(pixels: f64, samples: u32) -> f64 {
@@ -91,49 +59,9 @@ fn chance(pixels: f64, samples: u32) -> f64 {
     (1.0 + ONE_IN_TWENTY * variance.sqrt()).sqrt()
 }
 
-/// What the first half of the rounds were wrong by, of luminance.
-fn curve(rounds: &[Arc<Round>]) -> Vec<(u32, f64)> {
-    let Some(last) = rounds.last() else { return Vec::new() };
-    let part = |r: &Round| 1.0 - f64::from(r.samples) / f64::from(last.samples);
-    let first = rounds.iter().filter(|r| 2 * r.samples <= last.samples);
-    first.map(|r| (r.samples, (r.apart(last) / part(r).sqrt()).max(1e-9))).collect()
-}
-
 /// How far apart the pixels of a pilot are in the picture.
 fn apart(image: [u32; 2]) -> u32 {
     (f64::from(image[0]) * f64::from(image[1]) / PIXELS).sqrt().round().max(1.0) as u32
-}
-
-/// A pilot that is not waited for any more, as when a client goes away, is cancelled.
-struct CancelOnDrop<'a> {
-    engine: &'a Engine,
-    job: Arc<Job>,
-}
-
-impl Drop for CancelOnDrop<'_> {
-    fn drop(&mut self) {
-        self.engine.cancel(&self.job);
-    }
-}
-
-/// Runs every `apart`-th pixel of a request to its end, unseen.
-///
-/// # Errors
-/// Those of the request.
-pub async fn finish(planner: &Planner<'_>, request: Value, apart: u32) -> Result<Run> {
-    let scene = planner.scene(&request)?.into_pilot(apart);
-    let job = CancelOnDrop { engine: planner.engine, job: planner.engine.submit_pilot(request, scene) };
-    let job = &job.job;
-    let ended = job.watch().wait_for(|u| u.state.is_terminal()).await.map(drop).map_err(Error::internal);
-    let (state, film) = (job.state(), job.film());
-    ended?;
-    let failed = || Error::internal(format!("a pilot failed: {}", job.resource()["failure"]));
-    let (State::Done, Some((film, _))) = (state, film) else { return Err(failed()) };
-    let rounds = &film.rounds;
-    let (Some(first), Some(last)) = (rounds.first(), rounds.last()) else { return Err(failed()) };
-    let more = f64::from(last.samples - first.samples);
-    let sample = if more > 0.0 { (last.device_ms - first.device_ms) / more } else { first.device_ms };
-    Ok(Run { pixels: film.main.pixels(), ms: [(first.device_ms - sample).max(0.0), sample], film })
 }
 
 async fn run(
@@ -148,11 +76,6 @@ async fn run(
     request["budget"] = json!({"samples": samples.min(planner.limits.max_samples)});
     request["seed"] = json!(seed);
     finish(planner, request, apart).await
-}
-
-fn mean(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, n) = values.fold((0.0, 0.0), |(sum, n), v| (sum + v, n + 1.0));
-    if n > 0.0 { sum / n } else { 0.0 }
 }
 
 /// Runs the pilots; the first candidate is the reference.
@@ -189,7 +112,7 @@ pub async fn run_all(
             bias,
             bias_within,
             ms_per_sample: runs[0].ms[1].min(runs[1].ms[1]) / runs[0].pixels as f64,
-            first_step: first_step(&runs[0].film.rounds) / scale,
+            first_step: runs[0].apart(1, CONFIRMED) / scale,
             hopeful: true,
             whole: None,
         });
@@ -254,7 +177,7 @@ pub async fn confirm(planner: &Planner<'_>, body: &Value, pilots: &mut [Pilot], 
         let ((noise, pixels), count) = (found.film.random_noise(), found.film.main.count);
         (pilots[index].noise, pilots[index].chance) = (vec![(count, noise / found.mean())], chance(pixels, count));
     } else {
-        let seen = first_step(&found.film.rounds) / found.mean();
+        let seen = found.apart(1, CONFIRMED) / found.mean();
         let more = if seen > 0.0 && pilot.first_step > 0.0 { seen / pilot.first_step } else { 1.0 };
         for pilot in pilots.iter_mut().filter(|p| !p.is_random() && p.whole.is_none()) {
             pilot.noise.iter_mut().for_each(|(_, e)| *e *= more);
@@ -265,16 +188,9 @@ pub async fn confirm(planner: &Planner<'_>, body: &Value, pilots: &mut [Pilot], 
     Ok(())
 }
 
-/// What one sample differs by from the first few.
-fn first_step(rounds: &[Arc<Round>]) -> f64 {
-    match (rounds.first(), rounds.iter().find(|r| r.samples == CONFIRMED)) {
-        (Some(one), Some(few)) => one.apart(few),
-        _ => 0.0,
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::run::tests::noise;
     use super::*;
 
     #[test]
@@ -288,32 +204,5 @@ mod tests {
         assert!((bias - 0.03).abs() < within + 0.03 && bias + within > 0.03, "{bias} + {within}");
         let (bias, within) = lasting(products(0.0));
         assert!(bias + within < 0.12, "{bias} + {within}: nothing is missing");
-    }
-
-    #[test]
-    fn the_curve_of_random_samples_falls_as_their_root() {
-        let (mut random, mut sums) = (noise(3), vec![0.0f64; 4096]);
-        let mut rounds = Vec::new();
-        for samples in 1..=16u32 {
-            sums.iter_mut().for_each(|s| *s += random());
-            let luminance = sums.iter().map(|s| (s / f64::from(samples)) as f32).collect();
-            rounds.push(Arc::new(Round { samples, device_ms: 0.0, luminance }));
-        }
-        for (samples, error) in curve(&rounds) {
-            let expected = 0.3 / f64::from(samples).sqrt();
-            assert!((error / expected - 1.0).abs() < 0.04, "{samples}: {error} of {expected}");
-        }
-    }
-
-    /// Noise of deviation 0.3.
-    fn noise(seed: u32) -> impl FnMut() -> f64 {
-        let mut state = seed;
-        move || {
-            let mut next = || {
-                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                f64::from(state >> 8) / f64::from(1u32 << 24)
-            };
-            0.3 * ((0..12).map(|_| next()).sum::<f64>() - 6.0)
-        }
     }
 }
