@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::context::DeviceContext;
 use super::layer::Layer;
 use crate::error::Result;
-use crate::film::{Halves, Round, is_round};
+use crate::film::{Halves, Round, pilot_rounds};
 
 /// Samples after which a render's picture is first kept: before, a moving camera has had its frames.
 const FIRST: u32 = 4;
@@ -33,7 +33,8 @@ impl Rounds {
     pub fn passed(&mut self, context: &DeviceContext, layer: &Layer, device_time: Duration) -> Result<()> {
         let samples = layer.samples;
         let whole = samples.is_power_of_two();
-        if !(if self.pilot { is_round(samples) } else { samples >= FIRST && whole }) {
+        let wanted = if self.pilot { self.is_next_of_pilot(samples) } else { samples >= FIRST && whole };
+        if !wanted {
             return Ok(());
         }
         let main = layer.read(context)?;
@@ -48,6 +49,10 @@ impl Rounds {
         }
         self.kept.push(Arc::new(round));
         Ok(())
+    }
+
+    fn is_next_of_pilot(&self, samples: u32) -> bool {
+        pilot_rounds().nth(self.kept.len()) == Some(samples)
     }
 
     /// What the newest two differ by of which one has twice as many samples.

@@ -3,6 +3,7 @@
 use super::calibration::Calibration;
 use super::pilot::Pilot;
 use super::{Considered, Predicted, Wish};
+use crate::film::pilot_rounds;
 use crate::power_law::PowerLaw;
 
 /// What a plan aims at, of the error asked for: besides what chance does, estimates are off by a percent or two.
@@ -77,11 +78,9 @@ impl Pilot {
     fn samples_for(&self, error: f64, most: u32) -> Option<u32> {
         let room = error * error - (self.bias + self.bias_within).powi(2);
         let enough = |n: u32| (self.chance * self.noise_after(f64::from(n))).powi(2) <= room;
-        // The curve of evenly spread places need not fall everywhere: one at the pixel's middle can be better than a few at other places,
-        // and places are balanced after multiples of four (`job/places.rs`).
+        // The curve of evenly spread places need not fall everywhere: one at the pixel's middle can be better than a few at other places.
         if !self.is_random() {
-            let after = (4..64u32).step_by(4).chain((4..24).flat_map(|i| (8..16).map(move |k| k << i)));
-            return [1, 2, 3].into_iter().chain(after).find(|n| room > 0.0 && *n <= most && enough(*n));
+            return pilot_rounds().find(|n| room > 0.0 && *n <= most && enough(*n));
         }
         (room > 0.0 && enough(most)).then(|| {
             let (mut low, mut high) = (0, most);
