@@ -11,9 +11,7 @@ use crate::technique;
 const STEPS: [f64; 4] = [2.0, 1.0, 0.5, 0.25];
 /// Scatterings that are tried before all of them.
 const SCATTERINGS: [u32; 4] = [1, 2, 4, 8];
-/// Lights with a part of the light of so many times the error may be left out, if the pilot agrees: what is seen need not be lit by them.
-const FAINT: f64 = 10.0;
-/// A bound that is off by as much rules a setting out: it is of a slab, and the scene is not one.
+/// A bound that is off by as much rules a setting out: it is of a slab, or of what falls on the volume's middle, and the scene is not that.
 const SLACK: f64 = 3.0;
 
 /// Whether a request leaves the technique to the planner.
@@ -247,7 +245,7 @@ fn scattering(body: &Value, features: &Features, error: f64) -> (Vec<Candidate>,
         let more = if scatterings == 1 { &[][..] } else { &limit[..] };
         all.push(of(technique, more, words));
     }
-    let faint = features.faint_lights(FAINT * error);
+    let faint = features.faint_lights(SLACK * error);
     if let Some(given) = lights(&all[0].request(body)).filter(|_| super::is_auto(body) && !faint.is_empty()) {
         let fewer: Vec<Candidate> = all.iter().map(|c| c.without(given, &faint)).collect();
         all.extend(fewer);
