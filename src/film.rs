@@ -11,7 +11,7 @@ use std::sync::Arc;
 pub use estimate::ErrorEstimate;
 pub use lowered::Lowered;
 use picture::Background;
-pub(crate) use rounds::{Halves, Round, is_round, pilot_rounds};
+pub(crate) use rounds::{Halves, Round, SURE, is_round, pilot_rounds};
 
 /// Means and squared deviations of one set of samples, as the device leaves them (`kernels/shared/film.h`).
 #[derive(Debug, Clone, Default)]

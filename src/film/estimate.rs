@@ -32,7 +32,7 @@ impl Film {
         let noise = match self.main.count {
             // Of noise a 2×2 block's mean takes a quarter of the variance away.
             0 | 1 => self.noisy.then(|| self.main.resolution_error() * (4.0f64 / 3.0).sqrt()),
-            _ => Some(self.spread_noise(SURE).unwrap_or_else(|| self.random_noise().0)),
+            _ => Some(self.known_noise(SURE).0),
         };
         let truncation = self.truncation();
         let (discretisation, joint) = match (&self.control, self.main.stride) {
@@ -66,11 +66,11 @@ impl Film {
         ((sum / self.main.pixels().max(1) as f64).sqrt(), if squares > 0.0 { sum * sum / squares } else { 0.0 })
     }
 
-    /// The noise where the samples are spread better than random ones by so many `deviations`.
-    pub(crate) fn spread_noise(&self, deviations: f64) -> Option<f64> {
-        let halves = self.halves?;
+    /// The noise, and whether the samples are spread better than random ones, by so many `deviations`.
+    pub(crate) fn known_noise(&self, deviations: f64) -> (f64, bool) {
         let (random, pixels) = self.random_noise();
-        halves.noise(self.main.count, random, pixels, deviations)
+        let spread = self.halves.and_then(|h| h.noise(self.main.count, random, pixels, deviations));
+        spread.map_or((random, false), |noise| (noise, true))
     }
 
     /// The difference to the control, whose step is twice as long. A method of first order or better is at most this wrong:

@@ -116,7 +116,7 @@ impl Live {
         self.aim(context, complete)?;
         match (&mut self.view, &self.scene, &self.volume) {
             (Some(view), Some(scene), Some(volume)) if self.generation > 0 => {
-                view.hurry(context, scene, volume, &self.motion)
+                view.hurry(context, scene, volume, &mut self.motion)
             }
             _ => Ok(()),
         }
@@ -128,7 +128,7 @@ impl Live {
             let mut progress = self.job.lock();
             (progress.film.clone().zip(progress.error), progress.first_frame_before.take())
         };
-        self.motion.learn(seen.as_ref().map(|(film, error)| (&**film, error)), took);
+        self.motion.learn(seen, took);
     }
 
     /// Points the view at the newest camera, or begins it.

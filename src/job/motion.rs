@@ -1,5 +1,7 @@
 //! A picture while the camera moves: what is lowered of it, so that frames keep coming.
 
+use std::sync::Arc;
+
 use super::context::DeviceContext;
 use super::layer::Layer;
 use crate::error::Result;
@@ -25,26 +27,32 @@ const STREAM: u32 = 2;
 pub(super) struct Motion {
     /// What a frame may take on the device, ms: what encoding leaves of it, and whoever else works here.
     device_ms: f64,
+    /// The newest picture at rest, until what each part of it is worth is asked for.
+    at_rest: Option<(Arc<Film>, ErrorEstimate)>,
     losses: Option<Losses>,
 }
 
 impl Motion {
     pub fn new() -> Self {
-        Self { device_ms: DEVICE_MS[0], losses: None }
+        Self { device_ms: DEVICE_MS[0], at_rest: None, losses: None }
     }
 
-    /// Learns from a frame that was published: of one at rest what each part of it is worth, and from the time until the first frame of the
-    /// camera before how much there is for the device.
-    pub fn learn(&mut self, seen: Option<(&Film, &ErrorEstimate)>, first_frame_ms: Option<f64>) {
-        self.losses = seen.and_then(|(film, error)| Losses::of(film, error)).or(self.losses);
+    /// Learns from the newest picture, and from the time until the first frame of the camera before how much there is for the device.
+    pub fn learn(&mut self, seen: Option<(Arc<Film>, ErrorEstimate)>, first_frame_ms: Option<f64>) {
+        self.at_rest = seen.filter(|(film, _)| film.lowered.is_none()).or(self.at_rest.take());
         if let Some(took) = first_frame_ms {
             let change = (FRAME_MS / took.max(1.0)).clamp(1.0 / CHANGE, CHANGE);
             self.device_ms = (self.device_ms * change).clamp(DEVICE_MS[1], DEVICE_MS[2]);
         }
     }
 
-    /// What loses the least of a picture of so many rays that take `ray_ms` each, in time; of unknown losses all alike.
-    pub fn least(&self, rays: f64, ray_ms: f64, stepless: bool) -> (Lowered, f64) {
+    /// What is lowered of a picture of so many rays that take `ray_ms` each, and what its longer step loses: what loses the least of all
+    /// that is in time; nothing where the whole is. Of unknown losses all are alike.
+    pub fn least(&mut self, rays: f64, ray_ms: f64, stepless: bool) -> (Lowered, f64) {
+        if rays * ray_ms <= self.device_ms {
+            return (Lowered::default(), 0.0);
+        }
+        self.losses = self.at_rest.take().map(|(film, error)| Losses::of(&film, &error)).or(self.losses);
         let unknown = Losses { resolution: 1.0, step: (!stepless).then_some(1.0) };
         let losses = self.losses.unwrap_or(unknown);
         let lowered = losses.least(rays, ray_ms, self.device_ms);
@@ -56,16 +64,15 @@ impl Motion {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Losses {
     /// Half the resolution.
-    pub resolution: f64,
+    resolution: f64,
     /// Twice the step; none where the step plays no part.
-    pub step: Option<f64>,
+    step: Option<f64>,
 }
 
 impl Losses {
-    /// Of a picture at rest; none of one that was lowered itself.
-    fn of(film: &Film, error: &ErrorEstimate) -> Option<Self> {
-        let step = error.discretisation.filter(|_| !film.stepless);
-        film.lowered.is_none().then(|| Self { resolution: film.resolution_loss(), step })
+    /// Of a picture at rest.
+    fn of(film: &Film, error: &ErrorEstimate) -> Self {
+        Self { resolution: film.resolution_loss(), step: error.discretisation.filter(|_| !film.stepless) }
     }
 
     /// What is lost; a method of first order is assumed of the step, and edges of the pixels.

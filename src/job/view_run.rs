@@ -168,6 +168,7 @@ impl ViewRun {
     /// would make a good control, but for their number; a fresh one costs an eighth of a pass.
     pub fn halve_step(&mut self, context: &DeviceContext, scene: &Scene, volume: &Volume) -> Result<()> {
         self.plan.step *= 0.5;
+        self.moving = None;
         self.pace = Pace::new(context.device.info(), self.longest / f64::from(self.plan.step), None);
         for (layer, step) in self.layers.iter_mut().zip([2.0 * self.plan.step, self.plan.step]) {
             (layer.samples, layer.step) = (0, step);
@@ -205,7 +206,13 @@ impl ViewRun {
     }
 
     /// The camera moves: where all of the picture would be late, what loses the least is lowered in the first frame.
-    pub fn hurry(&mut self, context: &DeviceContext, scene: &Scene, volume: &Volume, motion: &Motion) -> Result<()> {
+    pub fn hurry(
+        &mut self,
+        context: &DeviceContext,
+        scene: &Scene,
+        volume: &Volume,
+        motion: &mut Motion,
+    ) -> Result<()> {
         let rays = (self.size[0] * self.size[1]) as f64;
         let ray_ms = self.ray_ms.or_else(|| context.speed(&self.plan.variant).map(f64::recip));
         let known = ray_ms.map(|ray_ms| motion.least(rays, ray_ms, self.plan.stepless));

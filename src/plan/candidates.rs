@@ -252,3 +252,24 @@ fn scattering(body: &Value, features: &Features, error: f64) -> (Vec<Candidate>,
     }
     (all, ruled_out)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lights_are_left_out_where_they_were_given() {
+        let three = json!([{"type": "sun"}, {"type": "point"}, {"type": "sky"}]);
+        let two = json!([{"type": "sun"}, {"type": "sky"}]);
+        let beside = json!({"technique": "auto", "lights": three});
+        let own = json!({"technique": "auto", "volume_path": {"lights": three}});
+        for body in [&beside, &own] {
+            let all = every_path(body);
+            let fewer = all.without(lights(&all.request(body)).unwrap_or(&Value::Null), &[1]);
+            let request = fewer.request(body);
+            assert_eq!(lights(&request), Some(&two), "{request}");
+            assert_eq!(request.get("lights").is_some(), body.get("lights").is_some(), "{request}");
+            assert!(!fewer.unbiased && fewer.words.ends_with("without the light that hardly reaches"));
+        }
+    }
+}

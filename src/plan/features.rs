@@ -99,9 +99,8 @@ fn medium(request: &Value) -> Option<MediumRequest> {
 fn light_shares(volume: &Volume, request: &Value) -> Vec<(usize, f64)> {
     let given = candidates::lights(request).and_then(|l| serde_json::from_value::<Vec<LightSource>>(l.clone()).ok());
     let lights = given.and_then(|sources| Lights::from_request(Some(&sources), "/lights").ok());
-    let shares = lights.map(|l| (l.shares(radius(volume)), l));
-    let aimed = shares.map(|(shares, l)| shares.into_iter().enumerate().filter(move |(i, _)| !l.is_sky(*i)).collect());
-    aimed.unwrap_or_default()
+    let shares = lights.map_or(Vec::new(), |l| l.shares(radius(volume)));
+    shares.into_iter().enumerate().filter_map(|(i, share)| Some((i, share?))).collect()
 }
 
 fn pixels_per_voxel(scene: &Scene, volume: &Volume) -> f64 {

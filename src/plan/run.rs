@@ -41,8 +41,9 @@ impl Run {
 
     /// The noise as a pilot has it, relative to `scale`.
     pub fn noise(&self, scale: f64) -> Vec<(u32, f64)> {
-        if self.film.spread_noise(BY_CHANCE).is_none() {
-            return vec![(self.film.main.count, self.film.random_noise().0 / scale)];
+        let (noise, is_spread) = self.film.known_noise(BY_CHANCE);
+        if !is_spread {
+            return vec![(self.film.main.count, noise / scale)];
         }
         curve(&self.film.rounds).into_iter().map(|(n, e)| (n, e / scale)).collect()
     }

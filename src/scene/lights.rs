@@ -280,19 +280,14 @@ impl Lights {
         })
     }
 
-    /// What part each light has of all that falls on a face in the middle of a volume of that radius, in the order of the request; 0 of a
-    /// sky, whose light comes from everywhere.
-    pub fn shares(&self, radius: f64) -> Vec<f64> {
+    /// What part each light has of all that falls on a face in the middle of a volume of that radius, in the order of the request; none of
+    /// a sky, whose light comes from everywhere.
+    pub fn shares(&self, radius: f64) -> Vec<Option<f64>> {
         let sky = self.sky().map_or(0.0, |s| s.radiance.into_iter().map(luminance).sum::<f64>() / 3.0);
-        let falls = |l: &LightSource| if l.kind == "sky" { 0.0 } else { l.irradiance_at_middle(radius) };
-        let all: Vec<f64> = self.0.iter().map(falls).collect();
-        let total = all.iter().sum::<f64>() + std::f64::consts::PI * sky;
-        all.into_iter().map(|share| if total > 0.0 { share / total } else { 0.0 }).collect()
-    }
-
-    /// Whether one is a sky.
-    pub fn is_sky(&self, index: usize) -> bool {
-        self.0.get(index).is_some_and(|l| l.kind == "sky")
+        let falls = |l: &LightSource| (l.kind != "sky").then(|| l.irradiance_at_middle(radius));
+        let all: Vec<Option<f64>> = self.0.iter().map(falls).collect();
+        let total = all.iter().flatten().sum::<f64>() + std::f64::consts::PI * sky;
+        all.into_iter().map(|share| share.map(|s| if total > 0.0 { s / total } else { 0.0 })).collect()
     }
 
     /// The kernel's table of all but the sky. A light is chosen the more often the more of it there is in the middle of a volume of that

@@ -8,7 +8,7 @@ use tokio::runtime::Handle;
 use crate::config::{DeviceArgs, Limits};
 use crate::device::DeviceInfo;
 use crate::error::{Error, Result};
-use crate::film::Film;
+use crate::film::{Film, SURE};
 use crate::job::{Engine, Job, State};
 use crate::plan::{Calibrations, Plan, Planner};
 use crate::scene::Scene;
@@ -44,6 +44,8 @@ pub struct Run {
     pub bytes: u64,
     /// What the reply says its error is.
     pub stated_error: Option<f64>,
+    /// Whether its noise is that of random samples: known, where that of evenly spread ones is a bound.
+    pub noise_is_random: bool,
     /// The whole reply.
     pub reply: Value,
 }
@@ -148,6 +150,7 @@ impl Bench {
             samples: u64::from(film.main.count),
             bytes: film.bytes() as u64 + job.field().map_or(0, |f| f.bytes()),
             stated_error: Some(error.total),
+            noise_is_random: !film.known_noise(SURE).1,
             reply,
         })
     }

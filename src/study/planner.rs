@@ -15,7 +15,7 @@ use crate::error::Result;
 const COST_FACTOR: f64 = 1.3;
 const TIME_FACTOR: f64 = 1.5;
 /// The truth's noise, of the error asked for: of evenly spread samples, and of random ones, whose noise is known and taken off.
-const TRUTH_NOISE: [f64; 2] = [0.25, 0.5];
+const TRUTH_NOISE: [f64; 2] = [0.2, 0.5];
 /// The most samples that are tried by force, and that a truth has.
 const MOST_SAMPLES: u64 = 4096;
 const MOST_TRUTH: u64 = 16_384;
@@ -208,13 +208,14 @@ fn truth(bench: &Bench, reference: &Value, asked: f64) -> Result<Known> {
     for side in ["width", "height"] {
         request["image"][side] = json!(2 * reference["image"][side].as_u64().unwrap_or(0));
     }
-    let random = request["technique"] == "volume_path";
-    if random {
+    if request["technique"] == "volume_path" {
         request["volume_path"]["tracking"] = json!("weighted");
     }
-    let (mut samples, most) = (16, TRUTH_NOISE[usize::from(random)] * asked);
+    let mut samples = 16;
     loop {
         let run = bench.run(&with_samples(&request, samples), Reads::Blocks(2))?;
+        let random = run.noise_is_random;
+        let most = TRUTH_NOISE[usize::from(random)] * asked;
         let noise = 0.5 * run.reply.pointer("/error_parts/noise").and_then(Value::as_f64).unwrap_or(0.0);
         let needed = (samples as f64 * (noise / most).powi(2)).ceil() as u64;
         if noise <= most || samples >= MOST_TRUTH {
@@ -243,8 +244,6 @@ fn outcome(bench: &Bench, scene: u64, request: &Value) -> Result<Outcome> {
             cheapest = Some((ms, words.clone()));
         }
     }
-    // Before and after: what else goes on here comes and goes.
-    let measured_ms = measured_ms.min(timed(bench, &plan.request)?.1);
     Ok(Outcome {
         scene,
         request: request.clone(),
@@ -273,6 +272,7 @@ fn timed(bench: &Bench, request: &Value) -> Result<(Run, f64)> {
 /// of samples that is not enough and the first that is, as a power law says.
 fn least_ms(bench: &Bench, setting: &Value, known: &Known, asked: f64, dearest: f64) -> Result<Option<f64>> {
     let (mut samples, mut before): (u64, Option<(u64, f64, f64)>) = (1, None);
+    let mut errors: Vec<f64> = Vec::new();
     while samples <= MOST_SAMPLES {
         let (run, time) = timed(bench, &with_samples(setting, samples))?;
         let error = known.error(&run);
@@ -286,8 +286,10 @@ fn least_ms(bench: &Bench, setting: &Value, known: &Known, asked: f64, dearest: 
                 ms + (time - ms) * ((needed - fewer) / (samples - fewer)).clamp(0.0, 1.0)
             })));
         }
-        // A bias that more samples do not take away, or a time that does not come back.
-        if samples > 16 && before.is_some_and(|(_, worse, _)| error > 0.9 * worse) || time > dearest {
+        // A bias that four times the samples do not take away, evenly spread as they may be, or a time that does not come back.
+        let earlier = errors.len().checked_sub(2).map(|i| errors[i]);
+        errors.push(error);
+        if samples > 16 && earlier.is_some_and(|worse| error > 0.9 * worse) || time > dearest {
             return Ok(None);
         }
         before = Some((samples, error, time));
