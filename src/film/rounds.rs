@@ -10,10 +10,13 @@ pub(crate) fn is_round(samples: u32) -> bool {
     samples.is_power_of_two() || (samples.is_multiple_of(3) && (samples / 3).is_power_of_two())
 }
 
-/// After how many samples a pilot is looked at: 1, 2, 3, then every fourth to 64 and every eighth part of an octave from there. How well
-/// evenly spread places do goes up and down between these, so a plan takes no other number of them.
+/// After how many samples a pilot is looked at: 1, 2, 3, 4, 6, then every fourth to 64 and every eighth part of an octave from there. How
+/// well evenly spread places do goes up and down between these.
 pub(crate) fn pilot_rounds() -> impl Iterator<Item = u32> {
-    (1..4).chain((4..64).step_by(4)).chain((3..24).flat_map(|octave| (8..16).map(move |eighth| eighth << octave)))
+    (1..5)
+        .chain([6])
+        .chain((8..64).step_by(4))
+        .chain((3..24).flat_map(|octave| (8..16).map(move |eighth| eighth << octave)))
 }
 
 /// The picture after some samples.
@@ -84,7 +87,7 @@ mod tests {
     #[test]
     fn pilots_are_looked_at_where_halves_can_be_compared() {
         let rounds: Vec<u32> = pilot_rounds().take_while(|n| *n <= 4096).collect();
-        assert_eq!(rounds[..8], [1, 2, 3, 4, 8, 12, 16, 20]);
+        assert_eq!(rounds[..9], [1, 2, 3, 4, 6, 8, 12, 16, 20]);
         assert!(rounds.windows(2).all(|w| w[0] < w[1]), "{rounds:?}");
         assert!((0..=12).all(|power| rounds.contains(&(1 << power))), "{rounds:?}");
     }

@@ -33,8 +33,9 @@ impl Layer {
     /// # Errors
     /// [`crate::error::Error::Internal`] when the device has none.
     pub fn new(device: &Device, scene: &Scene, volume: &Volume, stride: usize, stream: u32, step: f32) -> Result<Self> {
-        let apart = stride * scene.pilot().unwrap_or(1) as usize;
-        let [width, height] = scene.image().map(|n| (n as usize).div_ceil(apart));
+        let window = scene.window();
+        let apart = stride * window.apart as usize;
+        let [width, height] = window.size.map(|n| (n as usize).div_ceil(apart));
         let tiled = |_| -> Result<_> {
             let tiling = Tiling::new(width, height);
             let buffer = device.upload(&vec![0; tiling.room()], 0)?;

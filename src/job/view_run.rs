@@ -78,7 +78,8 @@ impl ViewRun {
         warm(&mut context.device, &(scene.technique().source)(), &plan.variant)?;
         let on_device = context.volume(volume)?;
         let distances = distances(context, &on_device, volume, &mut plan)?;
-        let size = scene.image().map(|n| n.div_ceil(scene.pilot().unwrap_or(1)) as usize);
+        let window = scene.window();
+        let size = window.size.map(|n| n.div_ceil(window.apart) as usize);
         let device = &context.device;
         let sparse = match size[0].min(size[1]) {
             400.. => CONTROL[0],
@@ -104,7 +105,7 @@ impl ViewRun {
             longest,
             least_step: (LEAST_STEP_VOXELS * smallest) as f32,
             random: scene.view().random(),
-            rounds: Rounds::new(scene.pilot().is_some()),
+            rounds: Rounds::new(scene.is_pilot()),
             plan,
             volume: on_device,
             distances,
@@ -125,7 +126,7 @@ impl ViewRun {
 
     /// What all passes are told.
     fn view(scene: &Scene, volume: &Volume) -> DeviceView {
-        let mut view = scene.camera().device_view(scene.image(), volume);
+        let mut view = scene.camera().device_view(scene.image(), scene.window().left_top, volume);
         view.full_width = scene.image()[0] as i32;
         view.seed = [scene.seed() as u32, (scene.seed() >> 32) as u32];
         scene.clip().apply(volume, &mut view);

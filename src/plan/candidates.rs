@@ -7,12 +7,15 @@ use super::features::Features;
 use crate::scene::AUTO;
 use crate::technique;
 
-/// Steps that are tried, sides of the smallest voxel.
-const STEPS: [f64; 4] = [2.0, 1.0, 0.5, 0.25];
-/// Scatterings that are tried before all of them.
-const SCATTERINGS: [u32; 4] = [1, 2, 4, 8];
-/// A bound that is off by as much rules a setting out: it is of a slab, or of what falls on the volume's middle, and the scene is not that.
+/// Steps that are tried, sides of the smallest voxel, and that of the reference.
+const STEPS: [f64; 4] = [0.25, 0.5, 1.0, 2.0];
+const SHORTEST: f64 = 0.125;
+/// Scatterings that are tried after all of them.
+const SCATTERINGS: [u32; 4] = [8, 4, 2, 1];
+/// A bound that is off by as much rules a setting out: it is of a slab, and the scene is not that.
 const SLACK: f64 = 3.0;
+/// Lights that are tried without, at most.
+const FAINTEST: usize = 3;
 
 /// Whether a request leaves the technique to the planner.
 pub fn is_auto(body: &Value) -> bool {
@@ -66,6 +69,8 @@ pub struct Candidate {
     pub words: String,
     /// Whether more samples take all of its error away.
     pub unbiased: bool,
+    /// The words of those that leave out less: where one of them leaves out too much, so does this.
+    pub less: Vec<String>,
 }
 
 impl Candidate {
@@ -84,17 +89,32 @@ impl Candidate {
         request
     }
 
-    /// The same without some of the lights.
-    fn without(&self, given: &Value, faint: &[usize]) -> Self {
+    /// The same without the faintest of the lights; the one before is without one of these fewer.
+    fn without(&self, given: &Value, faintest: &[usize]) -> Self {
         let all = given.as_array().cloned().unwrap_or_default();
-        let kept = all.into_iter().enumerate().filter(|(i, _)| !faint.contains(i)).map(|(_, light)| light);
-        let which = if faint.len() == 1 {
-            "light that hardly reaches".into()
-        } else {
-            format!("{} lights that hardly reach", faint.len())
+        let kept = all.into_iter().enumerate().filter(|(i, _)| !faintest.contains(i)).map(|(_, light)| light);
+        let without = |words: &str, n: usize| match n {
+            0 => words.to_owned(),
+            1 => format!("{words}, without the faintest light"),
+            n => format!("{words}, without the {n} faintest lights"),
         };
-        let words = format!("{}, without the {which}", self.words);
-        Self { lights: Some(kept.collect()), words, unbiased: false, ..self.clone() }
+        let n = faintest.len();
+        let less = self.less.iter().map(|less| without(less, n)).chain([without(&self.words, n - 1)]).collect();
+        Self { lights: Some(kept.collect()), words: without(&self.words, n), unbiased: false, less, ..self.clone() }
+    }
+
+    /// What a plan says of it where it was not tried.
+    pub fn skipped(&self, why: String) -> Considered {
+        Considered {
+            words: self.words.clone(),
+            technique: self.technique.clone(),
+            samples: None,
+            device_ms: None,
+            error: None,
+            bias: None,
+            enough: false,
+            why,
+        }
     }
 }
 
@@ -145,37 +165,32 @@ fn stepping(body: &Value, name: &str, flat: bool) -> Vec<Candidate> {
     let own = given(body, name);
     let schema = technique::find(name).map(|t| (t.schema)()).unwrap_or_default();
     let open = |field: &str| schema["properties"].get(field).is_some() && !own.contains_key(field);
-    let of = |more: &[(&str, Value)], words: String, unbiased: bool| {
+    let of = |more: &[(&str, Value)], words: String, less: Option<String>| {
         let mut own = own.clone();
         own.extend(more.iter().map(|(k, v)| ((*k).to_owned(), v.clone())));
-        Candidate { technique: name.into(), own: Value::Object(own), lights: None, words, unbiased }
+        let (technique, own) = (name.into(), Value::Object(own));
+        Candidate { technique, own, lights: None, words, unbiased: false, less: less.into_iter().collect() }
     };
     if !open("step_voxels") {
-        return vec![of(&[], format!("{name} as it is given"), true)];
+        return vec![Candidate { unbiased: true, ..of(&[], format!("{name} as it is given"), None) }];
     }
-    let ways: &[bool] = if open("pre_integrated") { &[false, true] } else { &[false] };
-    let mut all = Vec::new();
-    for way in ways {
+    let mut ways = vec![("", None)];
+    if open("pre_integrated") {
+        ways.push((", pre-integrated", Some(("pre_integrated", json!(true)))));
+    }
+    if flat && own.get("shading") == Some(&json!(true)) {
+        ways.push((", unshaded", Some(("shading", json!(false)))));
+    }
+    let shortest = [("step_voxels", json!(SHORTEST))];
+    let mut all = vec![Candidate { unbiased: true, ..of(&shortest, format!("{name}, the shortest step"), None) }];
+    for (way, more) in ways {
+        let mut shorter = None;
         for step in STEPS {
-            let mut more = vec![("step_voxels", json!(step))];
-            let mut words = format!("{name}, step of {step} voxels");
-            if *way {
-                more.push(("pre_integrated", json!(true)));
-                words += ", pre-integrated";
-            }
-            all.push(of(&more, words, false));
+            let set: Vec<_> = [("step_voxels", json!(step))].into_iter().chain(more.clone()).collect();
+            let words = format!("{name}, step of {step} voxels{way}");
+            all.push(of(&set, words.clone(), shorter.replace(words)));
         }
     }
-    let reference =
-        of(&[("step_voxels", json!(STEPS[STEPS.len() - 1] / 2.0))], format!("{name}, the shortest step"), true);
-    if flat && own.get("shading") == Some(&json!(true)) {
-        let unshaded = |step: &f64| {
-            let more = [("step_voxels", json!(step)), ("shading", json!(false))];
-            of(&more, format!("{name}, step of {step} voxels, unshaded"), false)
-        };
-        all.extend(STEPS.iter().map(unshaded));
-    }
-    all.insert(0, reference);
     all
 }
 
@@ -201,6 +216,7 @@ fn every_path(body: &Value) -> Candidate {
             lights: None,
             words: "single_scatter, as asked".into(),
             unbiased: true,
+            less: Vec::new(),
         },
         _ => Candidate {
             technique: "volume_path".into(),
@@ -208,46 +224,43 @@ fn every_path(body: &Value) -> Candidate {
             lights: None,
             words: "volume_path, every scattering".into(),
             unbiased: true,
+            less: Vec::new(),
         },
     }
 }
 
 fn scattering(body: &Value, features: &Features, error: f64) -> (Vec<Candidate>, Vec<Considered>) {
     let own = scattering_own(body);
-    let of = |technique: &str, more: &[(&str, Value)], words: String| {
+    let of = |technique: &str, more: &[(&str, Value)], words: String, less: String| {
         let mut own = own.clone();
         own.extend(more.iter().map(|(k, v)| ((*k).to_owned(), v.clone())));
-        Candidate { technique: technique.into(), own: Value::Object(own), lights: None, words, unbiased: false }
+        let (technique, own) = (technique.into(), Value::Object(own));
+        Candidate { technique, own, lights: None, words, unbiased: false, less: vec![less] }
     };
     let mut all = vec![every_path(body)];
     let mut ruled_out = Vec::new();
     let free = super::is_auto(body) && !own.contains_key("max_scatterings") && features.albedo != Some(0.0);
+    let mut more = all[0].words.clone();
     for scatterings in SCATTERINGS.into_iter().filter(|_| free) {
         let bound = features.missing(scatterings);
         let (technique, words) = match scatterings {
             1 => ("single_scatter", "single_scatter".to_owned()),
             n => ("volume_path", format!("volume_path, at most {n} scatterings")),
         };
-        if bound > SLACK * error {
-            ruled_out.push(Considered {
-                why: format!("a slab as deep as this would lack {:.1} % of what it sends back", 100.0 * bound),
-                words,
-                technique: technique.into(),
-                samples: None,
-                device_ms: None,
-                error: None,
-                bias: Some(bound),
-                enough: false,
-            });
-            continue;
-        }
         let limit = [("max_scatterings", json!(scatterings))];
-        let more = if scatterings == 1 { &[][..] } else { &limit[..] };
-        all.push(of(technique, more, words));
+        let limit = if scatterings == 1 { &[][..] } else { &limit[..] };
+        let candidate = of(technique, limit, words.clone(), std::mem::replace(&mut more, words));
+        if bound > SLACK * error {
+            let why = format!("a slab as deep as this would lack {:.1} % of what it sends back", 100.0 * bound);
+            ruled_out.push(Considered { bias: Some(bound), ..candidate.skipped(why) });
+        } else {
+            all.push(candidate);
+        }
     }
-    let faint = features.faint_lights(SLACK * error);
-    if let Some(given) = lights(&all[0].request(body)).filter(|_| super::is_auto(body) && !faint.is_empty()) {
-        let fewer: Vec<Candidate> = all.iter().map(|c| c.without(given, &faint)).collect();
+    let faintest = features.faintest_lights();
+    if let Some(given) = lights(&all[0].request(body)).filter(|_| super::is_auto(body)) {
+        let sets = (1..=faintest.len().min(FAINTEST)).map(|n| &faintest[..n]);
+        let fewer: Vec<Candidate> = sets.flat_map(|set| all.iter().map(|c| c.without(given, set))).collect();
         all.extend(fewer);
     }
     (all, ruled_out)
@@ -269,7 +282,7 @@ mod tests {
             let request = fewer.request(body);
             assert_eq!(lights(&request), Some(&two), "{request}");
             assert_eq!(request.get("lights").is_some(), body.get("lights").is_some(), "{request}");
-            assert!(!fewer.unbiased && fewer.words.ends_with("without the light that hardly reaches"));
+            assert!(!fewer.unbiased && fewer.words.ends_with("without the faintest light"));
         }
     }
 }

@@ -55,17 +55,11 @@ impl Features {
         missing(least, self.albedo.unwrap_or(0.0), scatterings)
     }
 
-    /// The lights, by their places in the request, that together have at most `part` of the light in the middle.
-    pub fn faint_lights(&self, part: f64) -> Vec<usize> {
+    /// All lights but skies, by their places in the request, the faintest first.
+    pub fn faintest_lights(&self) -> Vec<usize> {
         let mut shares = self.light_shares.clone();
         shares.sort_by(|a, b| a.1.total_cmp(&b.1));
-        let sums = shares.iter().scan(0.0, |sum, (i, share)| {
-            *sum += share;
-            Some((*i, *sum))
-        });
-        let mut faint: Vec<usize> = sums.take_while(|(_, sum)| *sum <= part).map(|(i, _)| i).collect();
-        faint.sort_unstable();
-        faint
+        shares.into_iter().map(|(i, _)| i).collect()
     }
 
     /// In words, for a reader.

@@ -2,16 +2,18 @@
 //!
 //! A request says what is looked at and how wrong the picture may be or how long it may take. From the scene's [`features`] come the
 //! settings that could do (`candidates`), less those that a bound rules out; a `pilot` of a few thousand pixels of the picture itself
-//! measures what each of the rest costs here and is wrong by, deeper where that might be the best, and the likely one is confirmed on the
-//! whole picture; `choose` takes the cheapest that is enough, or the best that is in time, and says why in words.
+//! measures what each of the rest costs here and is wrong by; what was `found` is looked at closer where that might be the best, and the
+//! likely one is confirmed on the whole picture; `choose` takes the cheapest that is enough, or the best that is in time, and says why in words.
 //!
-//! What grows how is what the study measured: random noise falls as the root of the samples, that of evenly spread ones by a power between
-//! ½ and 1; time is linear in samples and pixels.
+//! What grows how is what the study measured: random `noise` falls as the root of the samples, what the places in a pixel miss by a power
+//! between ½ and 1 and not everywhere; time is linear in samples and pixels.
 
 mod calibration;
 mod candidates;
 mod choose;
 pub mod features;
+mod found;
+mod noise;
 mod pilot;
 mod run;
 
@@ -27,6 +29,7 @@ pub use calibration::Calibrations;
 pub use candidates::is_auto;
 use candidates::{Candidate, Family};
 use features::Features;
+use found::Found;
 use pilot::Pilot;
 
 /// What is asked for where the budget is silent.
@@ -126,33 +129,34 @@ impl Planner<'_> {
         let (candidates, mut considered) = candidates::candidates(body, family, &features, wish.error);
         let possible: Vec<Candidate> =
             candidates.into_iter().filter(|c| self.scene(&c.request(body)).is_ok()).collect();
-        let mut pilots = pilot::run_all(self, body, scene.image(), &possible).await?;
-        let calibration = self.calibrations.of(self).await?;
         let image = scene.image();
+        // What is wrong by too much is of no use, unless all that there is time for is.
+        let useless = if wish.time_ms.is_none() { wish.error } else { f64::INFINITY };
+        let mut found = pilot::run_all(self, body, image, &possible, useless).await?;
+        found.look_closer(self, body, image).await?;
+        let calibration = self.calibrations.of(self).await?;
         let asked = body.pointer("/budget/samples").and_then(Value::as_u64).map_or(u32::MAX, |n| n as u32);
         let most = self.limits.max_samples.min(asked);
-        let choose = |pilots: &[Pilot]| choose::choose(pilots, wish, image, &calibration, most);
-        let mut chosen = choose(&pilots);
+        let choose = |found: &Found| choose::choose(&found.pilots, &found.places, wish, image, &calibration, most);
+        let mut chosen = choose(&found);
         for _ in 0..DEEPENED {
-            let likely = &pilots[chosen.index];
-            let deeper =
-                if chosen.enough { pilot::deepen(self, body, image, likely, chosen.samples).await? } else { None };
-            let Some(deeper) = deeper else { break };
-            pilots[chosen.index] = deeper;
-            chosen = choose(&pilots);
-        }
-        pilots.iter_mut().for_each(|p| p.hopeful = false);
-        chosen = choose(&pilots);
-        for _ in 0..CONFIRMED {
-            let likely = &pilots[chosen.index];
-            if likely.whole.is_some() || !(chosen.enough || wish.time_ms.is_some()) {
+            if !chosen.enough || !found.deepen(self, body, image, chosen.index, chosen.samples).await? {
                 break;
             }
-            pilot::confirm(self, body, &mut pilots, chosen.index).await?;
-            chosen = choose(&pilots);
+            chosen = choose(&found);
         }
-        considered.splice(0..0, chosen.considered);
-        let best = &pilots[chosen.index];
+        found.places.hopeful = false;
+        chosen = choose(&found);
+        for _ in 0..CONFIRMED {
+            let is_confirmed = found.pilots[chosen.index].whole.is_some();
+            if is_confirmed || !(chosen.enough || wish.time_ms.is_some()) {
+                break;
+            }
+            found.confirm(self, body, image, chosen.index).await?;
+            chosen = choose(&found);
+        }
+        considered.splice(0..0, chosen.considered.into_iter().chain(found.skipped));
+        let best = &found.pilots[chosen.index];
         let mut request = best.candidate.request(body);
         request["budget"] = budget(best, chosen.samples, chosen.enough, wish);
         let mut reasons = features.words();

@@ -125,8 +125,9 @@ impl Camera {
     }
 
     /// What the device is told for an image of `size` pixels of a volume: the plane near the volume and its pixels, worked out
-    /// in double precision so that a far eye costs no digits. The fields of the pass are left at zero.
-    pub fn device_view(&self, size: [u32; 2], volume: &Volume) -> View {
+    /// in double precision so that a far eye costs no digits; its first pixel is the one at `left`, `top`. The fields of the pass are left at
+    /// zero.
+    pub(crate) fn device_view(&self, size: [u32; 2], [left, top]: [u32; 2], volume: &Volume) -> View {
         let index_from_world = volume.world_from_index().inverse();
         let radius = super::radius(volume);
         // The plane through the volume's centre; an eye inside or behind gets one just ahead of it instead.
@@ -134,7 +135,8 @@ impl Camera {
         let reach = if self.perspective { ahead } else { (self.target - self.eye).length() };
         let pixel = 2.0 * reach * (0.5 * self.fov_y_deg.to_radians()).tan() / f64::from(size[1]);
         let (right, down) = (self.right * pixel, -self.up * pixel);
-        let corner = -right * (f64::from(size[0]) / 2.0) - down * (f64::from(size[1]) / 2.0);
+        let from_middle = |pixel: u32, size: u32| f64::from(pixel) - f64::from(size) / 2.0;
+        let corner = right * from_middle(left, size[0]) + down * from_middle(top, size[1]);
         let plane_centre = self.eye + self.forward * ahead;
         let towards = if self.perspective { self.forward * ahead + corner } else { self.forward };
         let narrow = |v: DVec3| v.as_vec3().to_array();

@@ -53,6 +53,24 @@ pub enum Subject {
     Field(Arc<dyn Field>),
 }
 
+/// Every so manyth pixel, across and down, of a part of a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Window {
+    /// Its corner, pixels of the picture.
+    pub left_top: [u32; 2],
+    /// Its sides, pixels of the picture.
+    pub size: [u32; 2],
+    /// How far apart its pixels are.
+    pub apart: u32,
+}
+
+impl Window {
+    /// Every `apart`-th pixel of a picture.
+    pub fn every(apart: u32, image: [u32; 2]) -> Self {
+        Self { left_top: [0, 0], size: image, apart: apart.max(1) }
+    }
+}
+
 /// A valid render request with its defaults resolved.
 #[derive(Clone)]
 pub struct Scene {
@@ -66,7 +84,7 @@ pub struct Scene {
     background: Background,
     budget: Budget,
     seed: u64,
-    pilot: Option<u32>,
+    pilot: Option<Window>,
 }
 
 /// The radius of the sphere around a volume's box, world units.
@@ -185,14 +203,19 @@ impl Scene {
         self.camera = camera;
     }
 
-    /// Only every `apart`-th pixel of the picture, across and down, with what each had come to on the way.
-    pub(crate) fn into_pilot(self, apart: u32) -> Self {
-        Self { pilot: Some(apart.max(1)), ..self }
+    /// Only these pixels of the picture, with what each had come to on the way.
+    pub(crate) fn into_pilot(self, window: Window) -> Self {
+        Self { pilot: Some(window), ..self }
     }
 
-    /// How far apart its pixels are, where it is a pilot.
-    pub(crate) fn pilot(&self) -> Option<u32> {
-        self.pilot
+    /// Whether it has only some of its pixels, for a planner.
+    pub(crate) fn is_pilot(&self) -> bool {
+        self.pilot.is_some()
+    }
+
+    /// The pixels of the picture that it has: but for a pilot all of them.
+    pub(crate) fn window(&self) -> Window {
+        self.pilot.unwrap_or(Window::every(1, self.image))
     }
 
     /// The view technique.

@@ -160,17 +160,15 @@ async fn lights_that_hardly_reach_may_go_and_others_not() {
         let lights = json!([{"type": "sun"}, {"type": "point", "position": [30, 5, 0], "intensity": intensity}, {"type": "sky", "radiance": 0.1}]);
         with(fog(3.0, 0.8, &json!({"max_error": 0.05})), "/lights", lights)
     };
-    let dropped = |plan: &Value| -> Option<Value> {
-        let all = plan["considered"].as_array().unwrap();
-        all.iter()
-            .find(|c| c["words"] == "volume_path, every scattering, without the light that hardly reaches")
-            .cloned()
-    };
+    let words = "volume_path, every scattering, without the faintest light";
     let faint = plan(&api, &lit(0.1)).await;
-    let without = dropped(&faint).unwrap();
+    let without = considered(&faint, words);
     assert_eq!(without["enough"], true, "{without}");
     assert!(without["bias"].as_f64() < Some(0.02), "{without}");
-    assert!(dropped(&plan(&api, &lit(3000.0)).await).is_none(), "three times the sun is not faint");
+    let strong = plan(&api, &lit(3000.0)).await;
+    assert_eq!(considered(&strong, words)["enough"], false, "the sun is missed beside a light three times as strong");
+    let less = considered(&strong, "volume_path, every scattering, without the 2 faintest lights");
+    assert!(less["why"].as_str().unwrap().contains("leaves out less, and that is too much"), "{less}");
     assert_eq!(api.finish(&faint["request"]).await["state"], "done");
 }
 

@@ -1,0 +1,167 @@
+//! What the pilots found, and a closer look at it where it may decide.
+
+use serde_json::Value;
+
+use super::noise::{Places, in_common, random};
+use super::pilot::{Pilot, SAMPLES, chance, deviation, run, some};
+use super::{Considered, Planner};
+use crate::error::Result;
+use crate::scene::Window;
+
+/// Samples of a deeper look, of those that are likely to be planned, and of those of the one before.
+const DEEPER: [u32; 2] = [8, 16];
+/// Samples of the whole picture with the chosen setting that confirm it, and where one takes long.
+const CONFIRMED: [u32; 2] = [4, 2];
+/// A picture of which a sample takes less, ms, is timed so often.
+const SHORT: f64 = 20.0;
+const REPEATS: usize = 3;
+/// Of fewer pixels that matter a pilot does not tell what the places miss in the picture.
+const FEW: f64 = 200.0;
+/// What part of that a closer look must have, and what part of the picture it may.
+const PART: f64 = 0.9;
+const MOST: f64 = 0.25;
+
+/// What the pilots found.
+pub struct Found {
+    /// Of those that were run, the reference first.
+    pub pilots: Vec<Pilot>,
+    /// What the places in a pixel miss, of all of them.
+    pub places: Places,
+    /// Pixels of the reference's pilot that matter.
+    pub matter: f64,
+    /// Where in the picture what the places miss is, if that is a small part of it, and what a mean of squares there is in the picture.
+    pub part: Option<(Window, f64)>,
+    /// Those that were not run, as one that leaves out less leaves out too much.
+    pub skipped: Vec<Considered>,
+}
+
+impl Found {
+    /// Where few pixels matter, as those around a lamp that is seen, a pilot has too few of them: the first samples of the whole picture
+    /// tell where they are.
+    ///
+    /// # Errors
+    /// Those of the request.
+    pub async fn look_closer(&mut self, planner: &Planner<'_>, body: &Value, image: [u32; 2]) -> Result<()> {
+        let reference = &self.pilots[0];
+        if self.matter >= FEW || self.places.is_small(SAMPLES / 2, reference.random) {
+            return Ok(());
+        }
+        let whole = Window::every(1, image);
+        let a = run(planner, body, &reference.candidate, whole, CONFIRMED[0], 1).await?;
+        let b = run(planner, body, &reference.candidate, whole, CONFIRMED[0], 2).await?;
+        let ([Some(one), Some(few)], [Some(other), Some(others)]) =
+            ([a.rounds().first(), a.rounds().last()], [b.rounds().first(), b.rounds().last()])
+        else {
+            return Ok(());
+        };
+        let missed: Vec<f64> = in_common([one, few], [other, others]).collect();
+        if let Some((window, share)) = around(&missed, image) {
+            let pixels = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
+            self.part = Some((window, pixels(window.size) / pixels(image) / share));
+            let candidate = reference.candidate.clone();
+            self.places = self.look_at_part(planner, body, &candidate, SAMPLES, a.mean()).await?;
+        }
+        Ok(())
+    }
+
+    /// What the places miss in the part of the picture where that is.
+    async fn look_at_part(
+        &self,
+        planner: &Planner<'_>,
+        body: &Value,
+        candidate: &super::candidates::Candidate,
+        samples: u32,
+        scale: f64,
+    ) -> Result<Places> {
+        let Some((window, part)) = self.part else { return Ok(self.places.clone()) };
+        let a = run(planner, body, candidate, window, samples, 1).await?;
+        let b = run(planner, body, candidate, window, samples, 2).await?;
+        // Places are the same for every seed: of all pixels there is nothing left to chance.
+        let within = if window.apart > 1 { deviation(a.film.random_noise().1) } else { 0.0 };
+        Ok(Places::by_two(a.rounds(), b.rounds(), scale / part.sqrt(), within))
+    }
+
+    /// Looks at what the places miss after `samples` of a pilot that are likely to be planned, unless that is known.
+    ///
+    /// # Errors
+    /// Those of the request.
+    pub async fn deepen(
+        &mut self,
+        planner: &Planner<'_>,
+        body: &Value,
+        image: [u32; 2],
+        index: usize,
+        samples: u32,
+    ) -> Result<bool> {
+        let pilot = &self.pilots[index];
+        let deep = (DEEPER[0] * samples).min(DEEPER[1] * self.places.last()).min(planner.limits.max_samples);
+        if self.places.is_known(samples, pilot.random) || deep < SAMPLES {
+            return Ok(false);
+        }
+        if self.part.is_some() {
+            self.places = self.look_at_part(planner, body, &pilot.candidate, deep, pilot.scale).await?;
+        } else {
+            let run = run(planner, body, &pilot.candidate, some([0, 0], image), deep, 1).await?;
+            self.places.look_deeper(run.rounds(), pilot.scale, pilot.random);
+        }
+        Ok(true)
+    }
+
+    /// The first samples of the whole picture, with the setting that is likely to be chosen: its time, and its random part, of which a
+    /// pilot may have seen more or less than there is, the others alike.
+    ///
+    /// # Errors
+    /// Those of the request.
+    pub async fn confirm(&mut self, planner: &Planner<'_>, body: &Value, image: [u32; 2], index: usize) -> Result<()> {
+        let candidate = self.pilots[index].candidate.clone();
+        let sample = self.pilots[index].ms_per_sample * f64::from(image[0]) * f64::from(image[1]);
+        let (samples, whole) = (CONFIRMED[usize::from(sample > SHORT)], Window::every(1, image));
+        let mut runs = Vec::new();
+        for seed in 1..=2 {
+            runs.push(run(planner, body, &candidate, whole, samples, seed).await?);
+        }
+        while runs.len() < REPEATS && runs[0].ms[0] + runs[0].ms[1] < SHORT {
+            runs.push(run(planner, body, &candidate, whole, samples, 1).await?);
+        }
+        let median = |i: usize| {
+            let mut all: Vec<f64> = runs.iter().map(|r| r.ms[i]).collect();
+            all.sort_by(f64::total_cmp);
+            all[(all.len() - 1) / 2]
+        };
+        let ms = [median(0), median(1)];
+        let [a, b] = [runs[0].rounds(), runs[1].rounds()];
+        let (scale, numbers) = (runs[0].mean(), a.len() as f64);
+        let (seen, matter) = (random(a, b, scale), runs[0].film.random_noise().1);
+        let more = if self.pilots[index].random > 0.0 { seen / self.pilots[index].random } else { 1.0 };
+        self.pilots.iter_mut().filter(|p| p.whole.is_none()).for_each(|p| p.random *= more);
+        let pilot = &mut self.pilots[index];
+        (pilot.random, pilot.chance, pilot.whole) = (seen, chance(matter, matter * numbers), Some(ms));
+        Ok(())
+    }
+}
+
+/// The rectangle around most of what is missed, and the part of it that it has; none where that is not a small part of the picture.
+fn around(missed: &[f64], [width, height]: [u32; 2]) -> Option<(Window, f64)> {
+    let total: f64 = missed.iter().sum();
+    let mut order: Vec<usize> = (0..missed.len()).collect();
+    order.sort_by(|a, b| missed[*b].total_cmp(&missed[*a]));
+    let (mut sum, mut least, mut most) = (0.0, [u32::MAX; 2], [0; 2]);
+    for i in order {
+        if sum >= PART * total {
+            break;
+        }
+        sum += missed[i];
+        for (axis, at) in [i as u32 % width, i as u32 / width].into_iter().enumerate() {
+            least[axis] = least[axis].min(at.saturating_sub(1));
+            most[axis] = most[axis].max((at + 2).min([width, height][axis]));
+        }
+    }
+    let size = [0, 1].map(|axis| most[axis].saturating_sub(least[axis]));
+    let small = f64::from(size[0]) * f64::from(size[1]) <= MOST * f64::from(width) * f64::from(height);
+    let inside = |i: usize| {
+        let at = [i as u32 % width, i as u32 / width];
+        (0..2).all(|axis| (least[axis]..most[axis]).contains(&at[axis]))
+    };
+    let share = (0..missed.len()).filter(|i| inside(*i)).map(|i| missed[i]).sum::<f64>() / total;
+    (total > 0.0 && small).then(|| (some(least, size), share.min(1.0)))
+}

@@ -1,0 +1,203 @@
+//! What more samples take away, in two parts that fall differently: e_n² = P_n² + J² / n.
+//!
+//! P_n is what the places in a pixel miss, of edges above all: the same for every seed and, as long as the picture is much the same, for
+//! every setting. J² is the variance that random numbers bring into a sample, along its path or in where its steps begin: a seed of its own
+//! has another.
+
+use std::sync::Arc;
+
+use crate::film::Round;
+
+/// A part of the variance that is too small to look at more closely.
+const SMALL: f64 = 0.1;
+/// How much more random than another setting one may be, in variance, for its look at the places to be good enough for that one.
+const AS_GOOD: f64 = 4.0;
+
+/// What is known of P after so many samples.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Known {
+    samples: u32,
+    /// P², relative.
+    squared: f64,
+    /// J² of the setting that was looked at, which blurs it.
+    random: f64,
+}
+
+/// P, by the numbers of samples that were looked at.
+#[derive(Debug, Clone, Default)]
+pub struct Places {
+    known: Vec<Known>,
+    /// What P² might be larger by: a pilot has few of the picture's edges.
+    within: f64,
+    /// Whether more samples than were looked at are taken to be as good as they could be: what might be the best is looked at.
+    pub hopeful: bool,
+}
+
+impl Places {
+    /// By two renders of the first setting with seeds of their own, relative to `scale`: the mean of (Iₙ − I_N) (I′ₙ − I′_N) in which
+    /// their random parts average to nothing. `within` is the relative deviation of such squares.
+    pub fn by_two(a: &[Arc<Round>], b: &[Arc<Round>], scale: f64, within: f64) -> Self {
+        let (Some(last), Some(other)) = (a.last(), b.last()) else { return Self::default() };
+        let random = random(a, b, scale);
+        let looked_at = a.iter().zip(b).filter(|(a, _)| 2 * a.samples <= last.samples);
+        let known = looked_at.map(|(a, b)| {
+            let products = in_common([a, last], [b, other]).filter(|d| d.is_finite());
+            let squared = products.sum::<f64>() / a.luminance.len().max(1) as f64 / (scale * scale);
+            let squared = apart(a, last, squared);
+            Known { samples: a.samples, squared, random }
+        });
+        Self { known: known.collect(), within, hopeful: true }
+    }
+
+    /// By more samples of one setting of which J² is known: |Iₙ − I_N|² = P² + J² (1/n − 1/N).
+    pub fn look_deeper(&mut self, rounds: &[Arc<Round>], scale: f64, random: f64) {
+        let Some(last) = rounds.last() else { return };
+        let seen: Vec<Known> = rounds
+            .iter()
+            .filter(|r| 2 * r.samples <= last.samples)
+            .map(|r| {
+                let by_chance = random * (1.0 / f64::from(r.samples) - 1.0 / f64::from(last.samples));
+                let squared = apart(r, last, (r.apart(last) / scale).powi(2) - by_chance);
+                Known { samples: r.samples, squared, random }
+            })
+            .collect();
+        let better = |k: &Known| k.random <= random && seen.iter().any(|s| s.samples == k.samples);
+        let kept: Vec<Known> = self.known.iter().copied().filter(better).collect();
+        let new = seen.into_iter().filter(|s| !kept.iter().any(|k| k.samples == s.samples));
+        let further = self.known.iter().copied().filter(|k| k.samples > last.samples / 2);
+        self.known = kept.iter().copied().chain(new).chain(further).collect();
+        self.known.sort_by_key(|k| k.samples);
+    }
+
+    /// The most samples that were looked at.
+    pub fn last(&self) -> u32 {
+        self.known.last().map_or(1, |k| k.samples)
+    }
+
+    /// P² after `samples`, relative. Between two numbers that were looked at it is the larger: it need not fall everywhere, places in the
+    /// middle or balanced around it are better than a few more. Beyond them it falls no faster than evenly spread places can, nor more
+    /// slowly than random ones.
+    pub fn squared_after(&self, samples: f64) -> f64 {
+        let Some(last) = self.known.last() else { return 0.0 };
+        let beyond = f64::from(last.samples) / samples;
+        let squared = if beyond <= 1.0 {
+            last.squared * beyond.powi(if self.hopeful { 2 } else { 1 })
+        } else {
+            let at = self.known.iter().position(|k| f64::from(k.samples) >= samples).unwrap_or(0);
+            let is_there = f64::from(self.known[at].samples) == samples;
+            let before = if is_there { 0.0 } else { self.known[at.saturating_sub(1)].squared };
+            self.known[at].squared.max(before)
+        };
+        squared * (1.0 + self.within)
+    }
+
+    /// Whether P after `samples` of a setting with this J² is known, or too small to matter.
+    pub fn is_known(&self, samples: u32, random: f64) -> bool {
+        let seen = self.known.iter().find(|k| k.samples >= samples);
+        seen.is_some_and(|s| s.random <= AS_GOOD * random) || self.is_small(samples, random)
+    }
+
+    /// Whether P after `samples` is too small to matter beside this J², even if it falls no faster than that.
+    pub fn is_small(&self, samples: u32, random: f64) -> bool {
+        let n = f64::from(samples);
+        Self { hopeful: false, ..self.clone() }.squared_after(n) <= SMALL * random / n
+    }
+}
+
+/// P² by what the picture differs by from that of more samples, which are no truth: |Iₙ − I_N|² = P² (1 + r^{3/2} − r − r^{1/2} + r^{1/2}
+/// (1 − r)^{1/2}) with r = n/N, as of a sum that wanders as fractional Brownian motion with 2H = ½ does. That is, P falls as n^{−3/4}, what
+/// evenly spread places come to at edges (Mitchell, "Consequences of stratified sampling in graphics", 1996); of random ones it were 1 − r.
+fn apart(few: &Round, more: &Round, squared: f64) -> f64 {
+    let r = f64::from(few.samples) / f64::from(more.samples);
+    squared.max(0.0) / (1.0 + r.powf(1.5) - r - r.sqrt() * (1.0 - (1.0 - r).sqrt()))
+}
+
+/// What two pictures differ by times what those of another seed do, of every pixel: (Iₙ − I_N) (I′ₙ − I′_N).
+pub fn in_common<'a>(a: [&'a Round; 2], b: [&'a Round; 2]) -> impl Iterator<Item = f64> + 'a {
+    let apart = |[few, more]: [&Round; 2], i: usize| f64::from(few.luminance[i]) - f64::from(more.luminance[i]);
+    (0..a[0].luminance.len()).map(move |i| apart(a, i) * apart(b, i))
+}
+
+/// J², relative: half of the variance of what two seeds differ by from round to round.
+pub fn random(a: &[Arc<Round>], b: &[Arc<Round>], scale: f64) -> f64 {
+    let (mut sum, mut count) = (0.0, 0usize);
+    let mut before: Option<(&Round, &Round)> = None;
+    for (a, b) in a.iter().zip(b) {
+        let samples = f64::from(a.samples);
+        let fewer = before.map_or(0.0, |(a, _)| f64::from(a.samples));
+        let apart = |(a, b): (&Round, &Round), i: usize| f64::from(a.luminance[i]) - f64::from(b.luminance[i]);
+        for i in 0..a.luminance.len() {
+            let difference = samples * apart((a, b), i) - before.map_or(0.0, |rounds| fewer * apart(rounds, i));
+            if difference.is_finite() {
+                sum += difference * difference / (2.0 * (samples - fewer));
+            }
+        }
+        count += a.luminance.len();
+        before = Some((a, b));
+    }
+    sum / count.max(1) as f64 / (scale * scale)
+}
+
+#[cfg(test)]
+pub mod tests {
+    use super::*;
+
+    /// Noise of deviation 0.3.
+    pub fn noise(seed: u32) -> impl FnMut() -> f64 {
+        let mut state = seed;
+        move || {
+            let mut next = || {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                f64::from(state >> 8) / f64::from(1u32 << 24)
+            };
+            0.3 * ((0..12).map(|_| next()).sum::<f64>() - 6.0)
+        }
+    }
+
+    const PIXELS: usize = 4096;
+
+    /// What the places of this test miss in a pixel after n samples.
+    fn missed(samples: u32, pixel: usize) -> f64 {
+        0.8 * (pixel as f64 * 2.399).sin() / f64::from(samples)
+    }
+
+    /// A picture of 1 with random numbers of that deviation, where the places miss something.
+    fn rounds(seed: u32, deviation: f64, most: u32) -> Vec<Arc<Round>> {
+        let (mut random, mut sums) = (noise(seed), vec![0.0f64; PIXELS]);
+        let of = |samples: u32| {
+            sums.iter_mut().for_each(|s| *s += deviation / 0.3 * random());
+            let value = |i: usize| 1.0 + missed(samples, i) + sums[i] / f64::from(samples);
+            Round { samples, device_ms: 0.0, luminance: (0..PIXELS).map(|i| value(i) as f32).collect() }
+        };
+        (1..=most).map(of).filter(|r| r.samples.is_power_of_two()).map(Arc::new).collect()
+    }
+
+    #[test]
+    fn places_and_random_numbers_are_told_apart() {
+        let of = |seed| rounds(seed, 0.5, 64);
+        let (a, b) = (of(3), of(4));
+        let found = random(&a, &b, 1.0);
+        assert!((found / 0.25 - 1.0).abs() < 0.03, "{found}");
+        let mut places = Places::by_two(&a[..5], &b[..5], 1.0, 0.0);
+        places.hopeful = false;
+        // 0.8² / 2 / n², and what of it the last has in common.
+        let expected = |n: f64, last: f64| {
+            let r = n / last;
+            0.32 * (1.0 / n - 1.0 / last).powi(2) / (1.0 + r.powf(1.5) - r - r.sqrt() + (r - r * r).sqrt())
+        };
+        for n in [1.0, 2.0, 4.0] {
+            let got = places.squared_after(n);
+            assert!((got - expected(n, 16.0)).abs() < 0.01 / n, "{n}: {got}, {}", expected(n, 16.0));
+        }
+        assert_eq!(places.last(), 8);
+        assert!(places.squared_after(3.0) >= places.squared_after(4.0), "between two it is the larger");
+        assert!((places.squared_after(32.0) / places.squared_after(8.0) - 0.25).abs() < 1e-9);
+        assert!(places.is_known(8, 0.25) && places.is_known(1000, 10.0) && !places.is_known(16, 1e-6));
+
+        places.look_deeper(&rounds(5, 0.05, 256), 1.0, 0.0025);
+        assert_eq!(places.last(), 128);
+        let got = places.squared_after(8.0);
+        assert!((got / expected(8.0, 256.0) - 1.0).abs() < 0.1, "{got}: less blurred than before");
+        assert!(places.is_known(128, 0.0025) && !places.is_known(8, 1e-6), "too blurred for what is less random");
+    }
+}
