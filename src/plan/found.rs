@@ -2,8 +2,10 @@
 
 use serde_json::Value;
 
-use super::noise::{Places, in_common, random};
+use super::candidates::Candidate;
+use super::noise::{Places, SMALL, in_common, mean, random};
 use super::pilot::{Pilot, SAMPLES, chance, deviation, run, some};
+use super::run::Run;
 use super::{Considered, Planner};
 use crate::error::Result;
 use crate::scene::Window;
@@ -15,8 +17,12 @@ const CONFIRMED: [u32; 2] = [4, 2];
 /// A picture of which a sample takes less, ms, is timed so often.
 const SHORT: f64 = 20.0;
 const REPEATS: usize = 3;
-/// Of fewer pixels that matter a pilot does not tell what the places miss in the picture.
+/// Of fewer pixels that matter a pilot does not tell what the places miss in the picture,
 const FEW: f64 = 200.0;
+/// nor where the first samples of the whole picture miss so many times as much, squared, or so many times less,
+const UNLIKE: f64 = 1.5;
+/// which must be seen by so many deviations, and matter.
+const SURE: f64 = 4.0;
 /// What part of that a closer look must have, and what part of the picture it may.
 const PART: f64 = 0.9;
 const MOST: f64 = 0.25;
@@ -36,48 +42,19 @@ pub struct Found {
 }
 
 impl Found {
-    /// Where few pixels matter, as those around a lamp that is seen, a pilot has too few of them: the first samples of the whole picture
-    /// tell where they are.
-    ///
-    /// # Errors
-    /// Those of the request.
-    pub async fn look_closer(&mut self, planner: &Planner<'_>, body: &Value, image: [u32; 2]) -> Result<()> {
-        let reference = &self.pilots[0];
-        if self.matter >= FEW || self.places.is_small(SAMPLES / 2, reference.random) {
-            return Ok(());
-        }
-        let whole = Window::every(1, image);
-        let a = run(planner, body, &reference.candidate, whole, CONFIRMED[0], 1).await?;
-        let b = run(planner, body, &reference.candidate, whole, CONFIRMED[0], 2).await?;
-        let ([Some(one), Some(few)], [Some(other), Some(others)]) =
-            ([a.rounds().first(), a.rounds().last()], [b.rounds().first(), b.rounds().last()])
-        else {
-            return Ok(());
-        };
-        let missed: Vec<f64> = in_common([one, few], [other, others]).collect();
-        if let Some((window, share)) = around(&missed, image) {
-            let pixels = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
-            self.part = Some((window, pixels(window.size) / pixels(image) / share));
-            let candidate = reference.candidate.clone();
-            self.places = self.look_at_part(planner, body, &candidate, SAMPLES, a.mean()).await?;
-        }
-        Ok(())
-    }
-
     /// What the places miss in the part of the picture where that is.
     async fn look_at_part(
         &self,
         planner: &Planner<'_>,
         body: &Value,
-        candidate: &super::candidates::Candidate,
+        candidate: &Candidate,
         samples: u32,
         scale: f64,
     ) -> Result<Places> {
         let Some((window, part)) = self.part else { return Ok(self.places.clone()) };
         let a = run(planner, body, candidate, window, samples, 1).await?;
         let b = run(planner, body, candidate, window, samples, 2).await?;
-        // Places are the same for every seed: of all pixels there is nothing left to chance.
-        let within = if window.apart > 1 { deviation(a.film.random_noise().1) } else { 0.0 };
+        let within = deviation(a.film.random_noise().1);
         Ok(Places::by_two(a.rounds(), b.rounds(), scale / part.sqrt(), within))
     }
 
@@ -107,14 +84,20 @@ impl Found {
         Ok(true)
     }
 
-    /// The first samples of the whole picture, with the setting that is likely to be chosen: its time, and its random part, of which a
-    /// pilot may have seen more or less than there is, the others alike.
+    /// The first samples of the whole picture, with the setting that is likely to be chosen, unless they are there: its time, and its
+    /// random part, of which a pilot may have seen more or less than there is, the others alike.
     ///
     /// # Errors
     /// Those of the request.
-    pub async fn confirm(&mut self, planner: &Planner<'_>, body: &Value, image: [u32; 2], index: usize) -> Result<()> {
-        let candidate = self.pilots[index].candidate.clone();
-        let sample = self.pilots[index].ms_per_sample * f64::from(image[0]) * f64::from(image[1]);
+    pub async fn confirm(
+        &mut self,
+        planner: &Planner<'_>,
+        body: &Value,
+        image: [u32; 2],
+        index: usize,
+    ) -> Result<bool> {
+        let Pilot { candidate, ms_per_sample, whole: None, .. } = self.pilots[index].clone() else { return Ok(false) };
+        let sample = ms_per_sample * f64::from(image[0]) * f64::from(image[1]);
         let (samples, whole) = (CONFIRMED[usize::from(sample > SHORT)], Window::every(1, image));
         let mut runs = Vec::new();
         for seed in 1..=2 {
@@ -130,12 +113,47 @@ impl Found {
         };
         let ms = [median(0), median(1)];
         let [a, b] = [runs[0].rounds(), runs[1].rounds()];
-        let (scale, numbers) = (runs[0].mean(), a.len() as f64);
-        let (seen, matter) = (random(a, b, scale), runs[0].film.random_noise().1);
+        let ((seen, matter), numbers) = (random(a, b, runs[0].mean()), a.len() as f64);
         let more = if self.pilots[index].random > 0.0 { seen / self.pilots[index].random } else { 1.0 };
         self.pilots.iter_mut().filter(|p| p.whole.is_none()).for_each(|p| p.random *= more);
         let pilot = &mut self.pilots[index];
         (pilot.random, pilot.chance, pilot.whole) = (seen, chance(matter, matter * numbers), Some(ms));
+        self.look_closer(planner, body, image, &candidate, [&runs[0], &runs[1]]).await?;
+        Ok(true)
+    }
+
+    /// Where few pixels matter, as those around a lamp that is seen, a pilot has too few of them or none: the first samples of the whole
+    /// picture, with seeds of their own, tell how much the places miss and where that is.
+    async fn look_closer(
+        &mut self,
+        planner: &Planner<'_>,
+        body: &Value,
+        image: [u32; 2],
+        candidate: &Candidate,
+        runs: [&Run; 2],
+    ) -> Result<()> {
+        let ([Some(first), Some(other)], [Some(last), Some(another)]) =
+            (runs.map(|r| r.rounds().first()), runs.map(|r| r.rounds().last()))
+        else {
+            return Ok(());
+        };
+        let (random, scale) = (random(runs[0].rounds(), runs[1].rounds(), runs[0].mean()).0, runs[0].mean());
+        let missed = in_common([first, last], [other, another]);
+        let squared = mean(&missed) / (scale * scale);
+        let is_seen = squared > random * (SURE / (missed.len() as f64).sqrt()).max(SMALL);
+        let more = self.places.more_by(last.samples, squared);
+        let differs = self.matter < FEW || !(1.0 / UNLIKE..UNLIKE).contains(&more);
+        if self.part.is_some() || !is_seen || !differs {
+            return Ok(());
+        }
+        if more.is_finite() {
+            self.places.scale(more);
+        }
+        if let Some((window, share)) = around(&missed, image) {
+            let pixels = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
+            self.part = Some((window, pixels(window.size) / pixels(image) / share));
+            self.places = self.look_at_part(planner, body, candidate, SAMPLES, scale).await?;
+        }
         Ok(())
     }
 }

@@ -35,10 +35,8 @@ use pilot::Pilot;
 /// What is asked for where the budget is silent.
 const USUAL_ERROR: f64 = 0.02;
 
-/// Pilots that are made deeper for one plan, at most.
-const DEEPENED: usize = 6;
-/// Settings whose first samples are taken of the whole picture, at most.
-const CONFIRMED: usize = 3;
+/// How often one plan looks deeper or at the whole picture, at most.
+const LOOKS: usize = 12;
 /// Of fewer samples than these the film knows its noise less well than a pilot.
 const FEW: u32 = 8;
 
@@ -133,28 +131,22 @@ impl Planner<'_> {
         // What is wrong by too much is of no use, unless all that there is time for is.
         let useless = if wish.time_ms.is_none() { wish.error } else { f64::INFINITY };
         let mut found = pilot::run_all(self, body, image, &possible, useless).await?;
-        found.look_closer(self, body, image).await?;
         let calibration = self.calibrations.of(self).await?;
         let asked = body.pointer("/budget/samples").and_then(Value::as_u64).map_or(u32::MAX, |n| n as u32);
         let most = self.limits.max_samples.min(asked);
         let choose = |found: &Found| choose::choose(&found.pilots, &found.places, wish, image, &calibration, most);
         let mut chosen = choose(&found);
-        for _ in 0..DEEPENED {
-            if !chosen.enough || !found.deepen(self, body, image, chosen.index, chosen.samples).await? {
+        for _ in 0..LOOKS {
+            let looked = (chosen.enough && found.deepen(self, body, image, chosen.index, chosen.samples).await?)
+                || ((chosen.enough || wish.time_ms.is_some())
+                    && found.confirm(self, body, image, chosen.index).await?);
+            if !looked && !std::mem::take(&mut found.places.hopeful) {
                 break;
             }
             chosen = choose(&found);
         }
         found.places.hopeful = false;
         chosen = choose(&found);
-        for _ in 0..CONFIRMED {
-            let is_confirmed = found.pilots[chosen.index].whole.is_some();
-            if is_confirmed || !(chosen.enough || wish.time_ms.is_some()) {
-                break;
-            }
-            found.confirm(self, body, image, chosen.index).await?;
-            chosen = choose(&found);
-        }
         considered.splice(0..0, chosen.considered.into_iter().chain(found.skipped));
         let best = &found.pilots[chosen.index];
         let mut request = best.candidate.request(body);

@@ -9,9 +9,11 @@ use std::sync::Arc;
 use crate::film::Round;
 
 /// A part of the variance that is too small to look at more closely.
-const SMALL: f64 = 0.1;
+pub const SMALL: f64 = 0.1;
 /// How much more random than another setting one may be, in variance, for its look at the places to be good enough for that one.
 const AS_GOOD: f64 = 4.0;
+/// Rounds of which the whole picture has some.
+const FIRST: usize = 4;
 
 /// What is known of P after so many samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,6 +29,8 @@ struct Known {
 #[derive(Debug, Clone, Default)]
 pub struct Places {
     known: Vec<Known>,
+    /// The squares of what these samples and the first differ by, in which there is nothing random.
+    steps: Vec<(u32, f64)>,
     /// What P² might be larger by: a pilot has few of the picture's edges.
     within: f64,
     /// Whether more samples than were looked at are taken to be as good as they could be: what might be the best is looked at.
@@ -38,15 +42,16 @@ impl Places {
     /// their random parts average to nothing. `within` is the relative deviation of such squares.
     pub fn by_two(a: &[Arc<Round>], b: &[Arc<Round>], scale: f64, within: f64) -> Self {
         let (Some(last), Some(other)) = (a.last(), b.last()) else { return Self::default() };
-        let random = random(a, b, scale);
+        let (random, _) = random(a, b, scale);
         let looked_at = a.iter().zip(b).filter(|(a, _)| 2 * a.samples <= last.samples);
         let known = looked_at.map(|(a, b)| {
-            let products = in_common([a, last], [b, other]).filter(|d| d.is_finite());
-            let squared = products.sum::<f64>() / a.luminance.len().max(1) as f64 / (scale * scale);
-            let squared = apart(a, last, squared);
+            let squared = apart(a, last, mean(&in_common([a, last], [b, other])) / (scale * scale));
             Known { samples: a.samples, squared, random }
         });
-        Self { known: known.collect(), within, hopeful: true }
+        let more = a.iter().zip(b).take(FIRST).skip(1);
+        let steps =
+            more.map(|(few, other)| (few.samples, mean(&in_common([&a[0], few], [&b[0], other])) / (scale * scale)));
+        Self { known: known.collect(), steps: steps.collect(), within, hopeful: true }
     }
 
     /// By more samples of one setting of which J² is known: |Iₙ − I_N|² = P² + J² (1/n − 1/N).
@@ -69,24 +74,41 @@ impl Places {
         self.known.sort_by_key(|k| k.samples);
     }
 
+    /// What the first sample of the whole picture and the first few miss, over what they do in the pilots.
+    pub fn more_by(&self, samples: u32, squared: f64) -> f64 {
+        let pilots = self.steps.iter().find(|s| s.0 == samples).map_or(0.0, |s| s.1);
+        if pilots > 0.0 { squared / pilots } else { f64::INFINITY }
+    }
+
+    /// That there is so much more of it than was seen.
+    pub fn scale(&mut self, more: f64) {
+        self.known
+            .iter_mut()
+            .map(|k| &mut k.squared)
+            .chain(self.steps.iter_mut().map(|s| &mut s.1))
+            .for_each(|s| *s *= more);
+    }
+
     /// The most samples that were looked at.
     pub fn last(&self) -> u32 {
         self.known.last().map_or(1, |k| k.samples)
     }
 
-    /// P² after `samples`, relative. Between two numbers that were looked at it is the larger: it need not fall everywhere, places in the
-    /// middle or balanced around it are better than a few more. Beyond them it falls no faster than evenly spread places can, nor more
-    /// slowly than random ones.
+    /// P² after `samples`, relative. It need not fall everywhere: places in the middle or balanced around it are better than a few more.
+    /// So between two numbers that were looked at it is taken to be twice the larger, and as one place more or less weighs, as the second
+    /// did: where it matters no such number is planned. Beyond them it falls no faster than evenly spread places can, nor more slowly than random ones.
     pub fn squared_after(&self, samples: f64) -> f64 {
         let Some(last) = self.known.last() else { return 0.0 };
         let beyond = f64::from(last.samples) / samples;
-        let squared = if beyond <= 1.0 {
+        let at = self.known.iter().position(|k| f64::from(k.samples) >= samples).unwrap_or(0);
+        let squared = if beyond < 1.0 {
             last.squared * beyond.powi(if self.hopeful { 2 } else { 1 })
+        } else if f64::from(self.known[at].samples) == samples {
+            self.known[at].squared
         } else {
-            let at = self.known.iter().position(|k| f64::from(k.samples) >= samples).unwrap_or(0);
-            let is_there = f64::from(self.known[at].samples) == samples;
-            let before = if is_there { 0.0 } else { self.known[at.saturating_sub(1)].squared };
-            self.known[at].squared.max(before)
+            let second = self.known.iter().find(|k| k.samples == 2).map_or(0.0, |k| k.squared);
+            let larger = self.known[at].squared.max(self.known[at.saturating_sub(1)].squared);
+            2.0 * larger + second * (2.0 / samples).powi(2)
         };
         squared * (1.0 + self.within)
     }
@@ -104,38 +126,44 @@ impl Places {
     }
 }
 
-/// P² by what the picture differs by from that of more samples, which are no truth: |Iₙ − I_N|² = P² (1 + r^{3/2} − r − r^{1/2} + r^{1/2}
-/// (1 − r)^{1/2}) with r = n/N, as of a sum that wanders as fractional Brownian motion with 2H = ½ does. That is, P falls as n^{−3/4}, what
-/// evenly spread places come to at edges (Mitchell, "Consequences of stratified sampling in graphics", 1996); of random ones it were 1 − r.
+/// P² by what the picture differs by from that of more samples, which are no truth: as random ones would, with |Iₙ − I_N|² = P² (1 − n/N).
 fn apart(few: &Round, more: &Round, squared: f64) -> f64 {
-    let r = f64::from(few.samples) / f64::from(more.samples);
-    squared.max(0.0) / (1.0 + r.powf(1.5) - r - r.sqrt() * (1.0 - (1.0 - r).sqrt()))
+    squared.max(0.0) / (1.0 - f64::from(few.samples) / f64::from(more.samples))
 }
 
 /// What two pictures differ by times what those of another seed do, of every pixel: (Iₙ − I_N) (I′ₙ − I′_N).
-pub fn in_common<'a>(a: [&'a Round; 2], b: [&'a Round; 2]) -> impl Iterator<Item = f64> + 'a {
+pub fn in_common(a: [&Round; 2], b: [&Round; 2]) -> Vec<f64> {
     let apart = |[few, more]: [&Round; 2], i: usize| f64::from(few.luminance[i]) - f64::from(more.luminance[i]);
-    (0..a[0].luminance.len()).map(move |i| apart(a, i) * apart(b, i))
+    let products = (0..a[0].luminance.len()).map(|i| apart(a, i) * apart(b, i));
+    products.map(|p| if p.is_finite() { p } else { 0.0 }).collect()
 }
 
-/// J², relative: half of the variance of what two seeds differ by from round to round.
-pub fn random(a: &[Arc<Round>], b: &[Arc<Round>], scale: f64) -> f64 {
-    let (mut sum, mut count) = (0.0, 0usize);
-    let mut before: Option<(&Round, &Round)> = None;
-    for (a, b) in a.iter().zip(b) {
-        let samples = f64::from(a.samples);
-        let fewer = before.map_or(0.0, |(a, _)| f64::from(a.samples));
-        let apart = |(a, b): (&Round, &Round), i: usize| f64::from(a.luminance[i]) - f64::from(b.luminance[i]);
-        for i in 0..a.luminance.len() {
-            let difference = samples * apart((a, b), i) - before.map_or(0.0, |rounds| fewer * apart(rounds, i));
-            if difference.is_finite() {
-                sum += difference * difference / (2.0 * (samples - fewer));
-            }
+/// 0 of none.
+pub fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+/// J², relative, by what two seeds differ by from round to round, half of the variance of that; and of how many pixels it is:
+/// ν = (Σ Jᵢ²)² / Σ Jᵢ⁴, where the square of a Jᵢ² that is known by k rounds is too large by 1 + 2/k.
+pub fn random(a: &[Arc<Round>], b: &[Arc<Round>], scale: f64) -> (f64, f64) {
+    let pixels = a.first().map_or(0, |r| r.luminance.len());
+    let rounds = a.len().min(b.len()).max(1) as f64;
+    let (mut sum, mut squares) = (0.0, 0.0);
+    for i in 0..pixels {
+        let (mut fewer, mut before, mut of_pixel) = (0.0, 0.0, 0.0);
+        for (a, b) in a.iter().zip(b) {
+            let samples = f64::from(a.samples);
+            let apart = samples * (f64::from(a.luminance[i]) - f64::from(b.luminance[i]));
+            of_pixel += (apart - before).powi(2) / (2.0 * (samples - fewer)) / rounds;
+            (fewer, before) = (samples, apart);
         }
-        count += a.luminance.len();
-        before = Some((a, b));
+        if of_pixel.is_finite() {
+            sum += of_pixel;
+            squares += of_pixel * of_pixel;
+        }
     }
-    sum / count.max(1) as f64 / (scale * scale)
+    let matter = if squares > 0.0 { sum * sum / squares * (1.0 + 2.0 / rounds) } else { 0.0 };
+    (sum / pixels.max(1) as f64 / (scale * scale), matter)
 }
 
 #[cfg(test)]
@@ -176,21 +204,19 @@ pub mod tests {
     fn places_and_random_numbers_are_told_apart() {
         let of = |seed| rounds(seed, 0.5, 64);
         let (a, b) = (of(3), of(4));
-        let found = random(&a, &b, 1.0);
+        let (found, pixels) = random(&a, &b, 1.0);
         assert!((found / 0.25 - 1.0).abs() < 0.03, "{found}");
+        assert!((pixels / PIXELS as f64 - 1.0).abs() < 0.1, "{pixels}: all of them alike");
         let mut places = Places::by_two(&a[..5], &b[..5], 1.0, 0.0);
         places.hopeful = false;
         // 0.8² / 2 / n², and what of it the last has in common.
-        let expected = |n: f64, last: f64| {
-            let r = n / last;
-            0.32 * (1.0 / n - 1.0 / last).powi(2) / (1.0 + r.powf(1.5) - r - r.sqrt() + (r - r * r).sqrt())
-        };
+        let expected = |n: f64, last: f64| 0.32 * (1.0 / n - 1.0 / last).powi(2) / (1.0 - n / last);
         for n in [1.0, 2.0, 4.0] {
             let got = places.squared_after(n);
             assert!((got - expected(n, 16.0)).abs() < 0.01 / n, "{n}: {got}, {}", expected(n, 16.0));
         }
         assert_eq!(places.last(), 8);
-        assert!(places.squared_after(3.0) >= places.squared_after(4.0), "between two it is the larger");
+        assert!(places.squared_after(3.0) > places.squared_after(2.0), "between two it is more than the larger");
         assert!((places.squared_after(32.0) / places.squared_after(8.0) - 0.25).abs() < 1e-9);
         assert!(places.is_known(8, 0.25) && places.is_known(1000, 10.0) && !places.is_known(16, 1e-6));
 

@@ -117,14 +117,14 @@ pub async fn run_all(
             too_much.push(&candidate.words);
         }
         let [a, b] = [runs[0].rounds(), runs[1].rounds()];
-        let seen = runs[0].film.random_noise().1;
+        let (random, seen) = random(a, b, scale);
         if references.is_none() {
-            found.places = Places::by_two(a, b, scale, deviation(seen));
-            found.matter = seen;
+            found.matter = runs[0].film.random_noise().1;
+            found.places = Places::by_two(a, b, scale, deviation(found.matter));
         }
         found.pilots.push(Pilot {
             candidate: candidate.clone(),
-            random: random(a, b, scale),
+            random,
             // There are more pixels in the picture, of the same kinds.
             chance: chance(seen * f64::from(window.apart).powi(2), seen * a.len() as f64),
             bias,
