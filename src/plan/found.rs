@@ -142,12 +142,15 @@ impl Found {
         let squared = mean(&missed) / (scale * scale);
         let is_seen = squared > random * (SURE / (missed.len() as f64).sqrt()).max(SMALL);
         let more = self.places.more_by(last.samples, squared);
-        let differs = self.matter < FEW || !(1.0 / UNLIKE..UNLIKE).contains(&more);
-        if self.part.is_some() || !is_seen || !differs {
+        if self.part.is_some() || !is_seen {
             return Ok(());
         }
-        if more.is_finite() {
-            self.places.scale(more);
+        let differs = self.matter < FEW || !(1.0 / UNLIKE..UNLIKE).contains(&more);
+        if more.is_finite() && (differs || last.samples == CONFIRMED[0]) {
+            self.places.scale(more, deviation(runs[0].film.random_noise().1));
+        }
+        if !differs {
+            return Ok(());
         }
         if let Some((window, share)) = around(&missed, image) {
             let pixels = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);

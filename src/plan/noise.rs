@@ -80,13 +80,11 @@ impl Places {
         if pilots > 0.0 { squared / pilots } else { f64::INFINITY }
     }
 
-    /// That there is so much more of it than was seen.
-    pub fn scale(&mut self, more: f64) {
-        self.known
-            .iter_mut()
-            .map(|k| &mut k.squared)
-            .chain(self.steps.iter_mut().map(|s| &mut s.1))
-            .for_each(|s| *s *= more);
+    /// That there is so much more of it than was seen, give or take `within`.
+    pub fn scale(&mut self, more: f64, within: f64) {
+        let squares = self.known.iter_mut().map(|k| &mut k.squared).chain(self.steps.iter_mut().map(|s| &mut s.1));
+        squares.for_each(|s| *s *= more);
+        self.within = within;
     }
 
     /// The most samples that were looked at.

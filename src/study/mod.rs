@@ -7,6 +7,7 @@
 //! A technique joins with a file in `cases/` and a line in [`CASES`].
 
 pub mod bench;
+mod by_force;
 pub mod cases;
 pub mod draw;
 pub mod experiments;

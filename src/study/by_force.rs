@@ -1,0 +1,138 @@
+//! What a setting really costs for an error: a truth, and more and more samples until they are enough.
+
+use serde_json::{Value, json};
+
+use super::bench::{Bench, Reads, Run};
+use crate::error::Result;
+
+/// The truth's noise, of the error asked for: of evenly spread samples, and of random ones.
+const TRUTH_NOISE: [f64; 2] = [0.2, 0.5];
+/// The most samples that are tried by force, and that a truth has.
+const MOST_SAMPLES: u64 = 4096;
+const MOST_TRUTH: u64 = 8192;
+/// A render that takes less, ms, is timed so often.
+const SHORT: f64 = 100.0;
+const REPEATS: usize = 5;
+/// Turns in which the plan and the cheapest setting are timed, where that takes longer.
+const TURNS: usize = 3;
+
+/// A truth and how well it is known.
+pub(super) struct Known {
+    values: Vec<f64>,
+    mean: f64,
+    noise: f64,
+}
+
+impl Known {
+    /// The relative error of a run, less the truth's own.
+    pub fn error(&self, run: &Run) -> f64 {
+        let squares =
+            run.values.iter().zip(&self.values).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / self.values.len() as f64;
+        (squares / self.mean.powi(2) - self.noise.powi(2)).max(0.0).sqrt()
+    }
+}
+
+/// The request with a number of samples for all of its budget.
+pub(super) fn with_samples(request: &Value, samples: u64) -> Value {
+    let mut request = request.clone();
+    request["budget"] = json!({"samples": samples});
+    request
+}
+
+/// The reference setting with other random numbers at other places, until it is known well enough: the means of 2 × 2 pixels of a
+/// picture twice as large each way, by two seeds. What these differ by is what is random in their mean; what the places miss they have in
+/// common, and it is not taken off. Of paths by weighted tracking.
+pub(super) fn truth(bench: &Bench, reference: &Value, asked: f64) -> Result<Known> {
+    let mut request = reference.clone();
+    for side in ["width", "height"] {
+        request["image"][side] = json!(2 * reference["image"][side].as_u64().unwrap_or(0));
+    }
+    if request["technique"] == "volume_path" {
+        request["volume_path"]["tracking"] = json!("weighted");
+    }
+    let mut samples = 8;
+    loop {
+        let of = |seed: u64| {
+            let mut request = with_samples(&request, samples);
+            request["seed"] = json!(seed);
+            bench.run(&request, Reads::Blocks(2))
+        };
+        let [a, b] = [of(77)?, of(78)?];
+        let random = a.noise_is_random;
+        let most = TRUTH_NOISE[usize::from(random)] * asked;
+        let stated = a.reply.pointer("/error_parts/noise").and_then(Value::as_f64).unwrap_or(0.0);
+        let noise = 0.5 * stated * if random { 0.5f64.sqrt() } else { 1.0 };
+        if noise <= most || samples >= MOST_TRUTH {
+            let values: Vec<f64> = a.values.iter().zip(&b.values).map(|(a, b)| 0.5 * (a + b)).collect();
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            let squares = a.values.iter().zip(&b.values).map(|(a, b)| (0.5 * (a - b)).powi(2)).sum::<f64>();
+            let noise = (squares / values.len() as f64).sqrt() / mean;
+            return Ok(Known { values, mean, noise });
+        }
+        let needed = (samples as f64 * (noise / most).powi(2)).ceil() as u64;
+        samples = needed.clamp(2 * samples, 8 * samples).next_power_of_two().min(MOST_TRUTH);
+    }
+}
+
+/// A run and its device time: of a short one the median of several.
+pub(super) fn timed(bench: &Bench, request: &Value) -> Result<(Run, f64)> {
+    let run = bench.run(request, Reads::Luminance)?;
+    let mut times = vec![run.device_ms];
+    while times.len() < REPEATS && run.device_ms < SHORT {
+        times.push(bench.run(request, Reads::Luminance)?.device_ms);
+    }
+    times.sort_by(f64::total_cmp);
+    Ok((run, times[times.len() / 2]))
+}
+
+/// Device times of the plan and of the cheapest setting, medians of several taken in turns: the machine has other work
+/// too. A plan takes `about_ms`.
+pub(super) fn in_turns(bench: &Bench, about_ms: f64, plan: &Value, cheapest: &Value) -> Result<(f64, f64)> {
+    let mut times = [Vec::new(), Vec::new()];
+    for _ in 0..if about_ms < SHORT { REPEATS } else { TURNS } {
+        for (times, request) in times.iter_mut().zip([plan, cheapest]) {
+            times.push(bench.run(request, Reads::Mean)?.device_ms);
+        }
+    }
+    let [plan, cheapest] = times.map(|mut t| {
+        t.sort_by(f64::total_cmp);
+        t[t.len() / 2]
+    });
+    Ok((plan, cheapest))
+}
+
+/// The least device time at which a setting is within the error, if that is less than `dearest`, and the samples: of random paths between
+/// the last number of them that is not enough and the first that is, as a power law says.
+pub(super) fn least_ms(
+    bench: &Bench,
+    setting: &Value,
+    known: &Known,
+    asked: f64,
+    dearest: f64,
+) -> Result<Option<(f64, u64)>> {
+    let (mut samples, mut before): (u64, Option<(u64, f64, f64)>) = (1, None);
+    let mut errors: Vec<f64> = Vec::new();
+    while samples <= MOST_SAMPLES {
+        let (run, time) = timed(bench, &with_samples(setting, samples))?;
+        let error = known.error(&run);
+        if error <= asked {
+            // Between two numbers of samples the error of random paths is known; of places that are spread evenly it jumps.
+            let random = setting["technique"] == "volume_path" || setting["technique"] == "single_scatter";
+            return Ok(Some(before.filter(|_| random).map_or((time, samples), |(fewer, worse, ms)| {
+                let [few, many] = [fewer as f64, samples as f64];
+                let power = (error / worse).ln() / (many / few).ln();
+                let needed = (few * (asked / worse).powf(1.0 / power)).ceil().clamp(few, many);
+                (ms + (time - ms) * (needed - few) / (many - few), needed as u64)
+            })));
+        }
+        // A bias that four times the samples do not take away, evenly spread as they may be, or a time that does not come back.
+        let earlier = errors.len().checked_sub(2).map(|i| errors[i]);
+        errors.push(error);
+        if samples > 16 && earlier.is_some_and(|worse| error > 0.9 * worse) || time > dearest {
+            return Ok(None);
+        }
+        before = Some((samples, error, time));
+        samples *= 2;
+    }
+    Ok(None)
+}
