@@ -186,3 +186,23 @@ fn around(missed: &[f64], [width, height]: [u32; 2]) -> Option<(Window, f64)> {
     let share = (0..missed.len()).filter(|i| inside(*i)).map(|i| missed[i]).sum::<f64>() / total;
     (total > 0.0 && small).then(|| (some(least, size), share.min(1.0)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_small_lamp_is_found_and_edges_everywhere_are_not_a_part() {
+        let image = [100, 80];
+        let mut missed: Vec<f64> = (0..8000).map(|i| if i % 2 == 0 { 1e-3 } else { -1e-3 }).collect();
+        for (x, y) in [(70, 9), (72, 9), (71, 12)] {
+            missed[y * 100 + x] = 5.0;
+        }
+        let found = around(&missed, image);
+        assert_eq!(found.map(|f| f.0), Some(Window { left_top: [69, 8], size: [5, 6], apart: 1 }));
+        assert!(found.is_some_and(|f| (f.1 - 1.0).abs() < 0.01), "{found:?}");
+        let everywhere: Vec<f64> = (0..8000).map(|i| f64::from(i % 7 == 0)).collect();
+        assert_eq!(around(&everywhere, image), None);
+        assert_eq!(around(&vec![0.0; 8000], image), None);
+    }
+}

@@ -31,7 +31,8 @@ pub struct Places {
     known: Vec<Known>,
     /// The squares of what these samples and the first differ by, in which there is nothing random.
     steps: Vec<(u32, f64)>,
-    /// What P² might be larger by: a pilot has few of the picture's edges.
+    /// How much more there is of P² in the picture than in the pilots, and what it might be larger by: these have few of its edges.
+    more: f64,
     within: f64,
     /// Whether more samples than were looked at are taken to be as good as they could be: what might be the best is looked at.
     pub hopeful: bool,
@@ -51,7 +52,7 @@ impl Places {
         let more = a.iter().zip(b).take(FIRST).skip(1);
         let steps =
             more.map(|(few, other)| (few.samples, mean(&in_common([&a[0], few], [&b[0], other])) / (scale * scale)));
-        Self { known: known.collect(), steps: steps.collect(), within, hopeful: true }
+        Self { known: known.collect(), steps: steps.collect(), more: 1.0, within, hopeful: true }
     }
 
     /// By more samples of one setting of which J² is known: |Iₙ − I_N|² = P² + J² (1/n − 1/N).
@@ -80,11 +81,9 @@ impl Places {
         if pilots > 0.0 { squared / pilots } else { f64::INFINITY }
     }
 
-    /// That there is so much more of it than was seen, give or take `within`.
+    /// That there is `more` times as much of P² in the picture as in the pilots, give or take `within`.
     pub fn scale(&mut self, more: f64, within: f64) {
-        let squares = self.known.iter_mut().map(|k| &mut k.squared).chain(self.steps.iter_mut().map(|s| &mut s.1));
-        squares.for_each(|s| *s *= more);
-        self.within = within;
+        (self.more, self.within) = (more, within);
     }
 
     /// The most samples that were looked at.
@@ -94,7 +93,8 @@ impl Places {
 
     /// P² after `samples`, relative. It need not fall everywhere: places in the middle or balanced around it are better than a few more.
     /// So between two numbers that were looked at it is taken to be twice the larger, and as one place more or less weighs, as the second
-    /// did: where it matters no such number is planned. Beyond them it falls no faster than evenly spread places can, nor more slowly than random ones.
+    /// did: where it matters no such number is planned. Beyond them it falls no faster than evenly spread places can, nor more slowly than
+    /// random ones.
     pub fn squared_after(&self, samples: f64) -> f64 {
         let Some(last) = self.known.last() else { return 0.0 };
         let beyond = f64::from(last.samples) / samples;
@@ -108,7 +108,7 @@ impl Places {
             let larger = self.known[at].squared.max(self.known[at.saturating_sub(1)].squared);
             2.0 * larger + second * (2.0 / samples).powi(2)
         };
-        squared * (1.0 + self.within)
+        squared * self.more * (1.0 + self.within)
     }
 
     /// Whether P after `samples` of a setting with this J² is known, or too small to matter.
@@ -222,6 +222,10 @@ pub mod tests {
         assert_eq!(places.last(), 128);
         let got = places.squared_after(8.0);
         assert!((got / expected(8.0, 256.0) - 1.0).abs() < 0.1, "{got}: less blurred than before");
+        let before = places.squared_after(8.0);
+        assert!(places.more_by(4, 1.0) > 1.0 && places.more_by(5, 1.0).is_infinite());
+        places.scale(2.0, 0.1);
+        assert!((places.squared_after(8.0) / before - 2.2).abs() < 1e-9);
         assert!(places.is_known(128, 0.0025) && !places.is_known(8, 1e-6), "too blurred for what is less random");
     }
 }
