@@ -33,9 +33,9 @@ impl Layer {
     /// # Errors
     /// [`crate::error::Error::Internal`] when the device has none.
     pub fn new(device: &Device, scene: &Scene, volume: &Volume, stride: usize, stream: u32, step: f32) -> Result<Self> {
-        let window = scene.window();
-        let apart = stride * window.apart as usize;
-        let [width, height] = window.size.map(|n| (n as usize).div_ceil(apart));
+        let region = scene.region();
+        let apart = stride * region.apart as usize;
+        let [width, height] = region.size.map(|n| (n as usize).div_ceil(apart));
         let tiled = |_| -> Result<_> {
             let tiling = Tiling::new(width, height);
             let buffer = device.upload(&vec![0; tiling.room()], 0)?;

@@ -78,8 +78,8 @@ impl ViewRun {
         warm(&mut context.device, &(scene.technique().source)(), &plan.variant)?;
         let on_device = context.volume(volume)?;
         let distances = distances(context, &on_device, volume, &mut plan)?;
-        let window = scene.window();
-        let size = window.size.map(|n| n.div_ceil(window.apart) as usize);
+        let region = scene.region();
+        let size = region.size.map(|n| n.div_ceil(region.apart) as usize);
         let device = &context.device;
         let sparse = match size[0].min(size[1]) {
             400.. => CONTROL[0],
@@ -126,7 +126,7 @@ impl ViewRun {
 
     /// What all passes are told.
     fn view(scene: &Scene, volume: &Volume) -> DeviceView {
-        let mut view = scene.camera().device_view(scene.image(), scene.window().left_top, volume);
+        let mut view = scene.camera().device_view(scene.image(), scene.region().left_top, volume);
         view.full_width = scene.image()[0] as i32;
         view.seed = [scene.seed() as u32, (scene.seed() >> 32) as u32];
         scene.clip().apply(volume, &mut view);

@@ -1,22 +1,19 @@
 //! What the pilots found, and a closer look at it where it may decide.
 
-use serde_json::Value;
-
+use super::Considered;
 use super::candidates::Candidate;
-use super::noise::{Places, SMALL, in_common, mean, random};
-use super::pilot::{Pilot, SAMPLES, chance, deviation, run, some};
-use super::run::Run;
-use super::{Considered, Planner};
+use super::noise::{Places, SMALL, in_common, random};
+use super::pilot::{PIXELS, Pilot, SAMPLES, chance, deviation};
+use super::run::{Asked, Run, mean};
 use crate::error::Result;
-use crate::scene::Window;
+use crate::scene::region::Region;
 
 /// Samples of a deeper look, of those that are likely to be planned, and of those of the one before.
 const DEEPER: [u32; 2] = [8, 16];
 /// Samples of the whole picture with the chosen setting that confirm it, and where one takes long.
 const CONFIRMED: [u32; 2] = [4, 2];
-/// A picture of which a sample takes less, ms, is timed so often.
+/// A sample that takes longer, ms, takes long; a picture of which one takes less is timed once more.
 const SHORT: f64 = 20.0;
-const REPEATS: usize = 3;
 /// Of fewer pixels that matter a pilot does not tell what the places miss in the picture,
 const FEW: f64 = 200.0;
 /// nor where the first samples of the whole picture miss so many times as much, squared, or so many times less,
@@ -36,24 +33,16 @@ pub struct Found {
     /// Pixels of the reference's pilot that matter.
     pub matter: f64,
     /// Where in the picture what the places miss is, if that is a small part of it, and what a mean of squares there is in the picture.
-    pub part: Option<(Window, f64)>,
+    pub part: Option<(Region, f64)>,
     /// Those that were not run, as one that leaves out less leaves out too much.
     pub skipped: Vec<Considered>,
 }
 
 impl Found {
     /// What the places miss in the part of the picture where that is.
-    async fn look_at_part(
-        &self,
-        planner: &Planner<'_>,
-        body: &Value,
-        candidate: &Candidate,
-        samples: u32,
-        scale: f64,
-    ) -> Result<Places> {
-        let Some((window, part)) = self.part else { return Ok(self.places.clone()) };
-        let a = run(planner, body, candidate, window, samples, 1).await?;
-        let b = run(planner, body, candidate, window, samples, 2).await?;
+    async fn look_at_part(&self, asked: Asked<'_>, candidate: &Candidate, samples: u32, scale: f64) -> Result<Places> {
+        let Some((region, part)) = self.part else { return Ok(self.places.clone()) };
+        let [a, b] = asked.run_two(candidate, region, samples).await?;
         let within = deviation(a.film.random_noise().1);
         Ok(Places::by_two(a.rounds(), b.rounds(), scale / part.sqrt(), within))
     }
@@ -62,23 +51,18 @@ impl Found {
     ///
     /// # Errors
     /// Those of the request.
-    pub async fn deepen(
-        &mut self,
-        planner: &Planner<'_>,
-        body: &Value,
-        image: [u32; 2],
-        index: usize,
-        samples: u32,
-    ) -> Result<bool> {
+    pub async fn deepen(&mut self, asked: Asked<'_>, index: usize, samples: u32) -> Result<bool> {
         let pilot = &self.pilots[index];
-        let deep = (DEEPER[0] * samples).min(DEEPER[1] * self.places.last()).min(planner.limits.max_samples);
+        let most = asked.planner.limits.max_samples;
+        let deep = (DEEPER[0] * samples).min(DEEPER[1] * self.places.last()).min(most);
         if self.places.is_known(samples, pilot.random) || deep < SAMPLES {
             return Ok(false);
         }
         if self.part.is_some() {
-            self.places = self.look_at_part(planner, body, &pilot.candidate, deep, pilot.scale).await?;
+            self.places = self.look_at_part(asked, &pilot.candidate, deep, pilot.scale).await?;
         } else {
-            let run = run(planner, body, &pilot.candidate, some([0, 0], image), deep, 1).await?;
+            let region = Region::some(PIXELS, [0, 0], asked.image);
+            let run = asked.run(&pilot.candidate, region, deep, 1).await?;
             self.places.look_deeper(run.rounds(), pilot.scale, pilot.random);
         }
         Ok(true)
@@ -89,80 +73,86 @@ impl Found {
     ///
     /// # Errors
     /// Those of the request.
-    pub async fn confirm(
-        &mut self,
-        planner: &Planner<'_>,
-        body: &Value,
-        image: [u32; 2],
-        index: usize,
-    ) -> Result<bool> {
+    pub async fn confirm(&mut self, asked: Asked<'_>, index: usize) -> Result<bool> {
         let Pilot { candidate, ms_per_sample, whole: None, .. } = self.pilots[index].clone() else { return Ok(false) };
-        let sample = ms_per_sample * f64::from(image[0]) * f64::from(image[1]);
-        let (samples, whole) = (CONFIRMED[usize::from(sample > SHORT)], Window::every(1, image));
-        let mut runs = Vec::new();
-        for seed in 1..=2 {
-            runs.push(run(planner, body, &candidate, whole, samples, seed).await?);
+        let sample = ms_per_sample * f64::from(asked.image[0]) * f64::from(asked.image[1]);
+        let (samples, whole) = (CONFIRMED[usize::from(sample > SHORT)], Region::every(1, asked.image));
+        let runs = asked.run_two(&candidate, whole, samples).await?;
+        let mut ms = [0, 1].map(|i| runs[0].ms[i].min(runs[1].ms[i]));
+        if ms[0] + ms[1] < SHORT {
+            let again = asked.run(&candidate, whole, samples, 1).await?;
+            ms = [0, 1].map(|i| ms[i].min(again.ms[i]));
         }
-        while runs.len() < REPEATS && runs[0].ms[0] + runs[0].ms[1] < SHORT {
-            runs.push(run(planner, body, &candidate, whole, samples, 1).await?);
-        }
-        let median = |i: usize| {
-            let mut all: Vec<f64> = runs.iter().map(|r| r.ms[i]).collect();
-            all.sort_by(f64::total_cmp);
-            all[(all.len() - 1) / 2]
-        };
-        let ms = [median(0), median(1)];
-        let [a, b] = [runs[0].rounds(), runs[1].rounds()];
-        let ((seen, matter), numbers) = (random(a, b, runs[0].mean()), a.len() as f64);
-        let more = if self.pilots[index].random > 0.0 { seen / self.pilots[index].random } else { 1.0 };
+        // The picture may have millions of pixels: the runtime's other work goes on meanwhile.
+        let seen = tokio::task::block_in_place(|| WholePicture::of(&runs, asked.image));
+        let more = if self.pilots[index].random > 0.0 { seen.random / self.pilots[index].random } else { 1.0 };
         self.pilots.iter_mut().filter(|p| p.whole.is_none()).for_each(|p| p.random *= more);
         let pilot = &mut self.pilots[index];
-        (pilot.random, pilot.chance, pilot.whole) = (seen, chance(matter, matter * numbers), Some(ms));
-        self.look_closer(planner, body, image, &candidate, [&runs[0], &runs[1]]).await?;
+        (pilot.random, pilot.whole) = (seen.random, Some(ms));
+        pilot.chance = chance(seen.matter, seen.matter * f64::from(samples));
+        self.look_closer(asked, &candidate, &seen).await?;
         Ok(true)
     }
 
     /// Where few pixels matter, as those around a lamp that is seen, a pilot has too few of them or none: the first samples of the whole
-    /// picture, with seeds of their own, tell how much the places miss and where that is.
-    async fn look_closer(
-        &mut self,
-        planner: &Planner<'_>,
-        body: &Value,
-        image: [u32; 2],
-        candidate: &Candidate,
-        runs: [&Run; 2],
-    ) -> Result<()> {
-        let ([Some(first), Some(other)], [Some(last), Some(another)]) =
-            (runs.map(|r| r.rounds().first()), runs.map(|r| r.rounds().last()))
-        else {
-            return Ok(());
-        };
-        let (random, scale) = (random(runs[0].rounds(), runs[1].rounds(), runs[0].mean()).0, runs[0].mean());
-        let missed = in_common([first, last], [other, another]);
-        let squared = mean(&missed) / (scale * scale);
-        let is_seen = squared > random * (SURE / (missed.len() as f64).sqrt()).max(SMALL);
-        let more = self.places.more_by(last.samples, squared);
-        if self.part.is_some() || !is_seen {
+    /// picture tell how much the places miss and where that is.
+    async fn look_closer(&mut self, asked: Asked<'_>, candidate: &Candidate, seen: &WholePicture) -> Result<()> {
+        let by_chance = seen.random / f64::from(asked.image[0]).sqrt() / f64::from(asked.image[1]).sqrt();
+        if self.part.is_some() || seen.missed <= (SURE * by_chance).max(SMALL * seen.random) {
             return Ok(());
         }
+        let more = self.places.more_by(seen.samples, seen.missed);
         let differs = self.matter < FEW || !(1.0 / UNLIKE..UNLIKE).contains(&more);
-        if more.is_finite() && (differs || last.samples == CONFIRMED[0]) {
-            self.places.scale(more, deviation(runs[0].film.random_noise().1));
+        if more.is_finite() && (differs || seen.samples == CONFIRMED[0]) {
+            self.places.scale(more, seen.within);
         }
-        if !differs {
-            return Ok(());
-        }
-        if let Some((window, share)) = around(&missed, image) {
+        if let Some((region, share)) = seen.around.filter(|_| differs) {
             let pixels = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
-            self.part = Some((window, pixels(window.size) / pixels(image) / share));
-            self.places = self.look_at_part(planner, body, candidate, SAMPLES, scale).await?;
+            self.part = Some((region, pixels(region.size) / pixels(asked.image) / share));
+            self.places = self.look_at_part(asked, candidate, SAMPLES, seen.scale).await?;
         }
         Ok(())
     }
 }
 
+/// What the first samples of a whole picture tell, by two seeds.
+struct WholePicture {
+    samples: u32,
+    /// The mean luminance.
+    scale: f64,
+    /// J² of `noise`, relative, and the pixels that it is of.
+    random: f64,
+    matter: f64,
+    /// What the first sample and the last differ by that is not random, squared, relative; what that might be off by.
+    missed: f64,
+    within: f64,
+    /// Where most of that is, as `around` has it.
+    around: Option<(Region, f64)>,
+}
+
+impl WholePicture {
+    fn of([a, b]: &[Run; 2], image: [u32; 2]) -> Self {
+        let scale = a.mean();
+        let (random, matter) = random(a.rounds(), b.rounds(), scale);
+        let ends = |run: &Run| run.rounds().first().cloned().zip(run.rounds().last().cloned());
+        let missed: Vec<f64> = match (ends(a), ends(b)) {
+            (Some((first, last)), Some((other, another))) => in_common([&first, &last], [&other, &another]).collect(),
+            _ => Vec::new(),
+        };
+        Self {
+            samples: a.film.main.count,
+            scale,
+            random,
+            matter,
+            missed: mean(missed.iter().copied()) / (scale * scale),
+            within: deviation(a.film.random_noise().1),
+            around: around(&missed, image),
+        }
+    }
+}
+
 /// The rectangle around most of what is missed, and the part of it that it has; none where that is not a small part of the picture.
-fn around(missed: &[f64], [width, height]: [u32; 2]) -> Option<(Window, f64)> {
+fn around(missed: &[f64], [width, height]: [u32; 2]) -> Option<(Region, f64)> {
     let total: f64 = missed.iter().sum();
     let mut order: Vec<usize> = (0..missed.len()).collect();
     order.sort_by(|a, b| missed[*b].total_cmp(&missed[*a]));
@@ -184,7 +174,7 @@ fn around(missed: &[f64], [width, height]: [u32; 2]) -> Option<(Window, f64)> {
         (0..2).all(|axis| (least[axis]..most[axis]).contains(&at[axis]))
     };
     let share = (0..missed.len()).filter(|i| inside(*i)).map(|i| missed[i]).sum::<f64>() / total;
-    (total > 0.0 && small).then(|| (some(least, size), share.min(1.0)))
+    (total > 0.0 && small).then(|| (Region::some(PIXELS, least, size), share.min(1.0)))
 }
 
 #[cfg(test)]
@@ -199,7 +189,7 @@ mod tests {
             missed[y * 100 + x] = 5.0;
         }
         let found = around(&missed, image);
-        assert_eq!(found.map(|f| f.0), Some(Window { left_top: [69, 8], size: [5, 6], apart: 1 }));
+        assert_eq!(found.map(|f| f.0), Some(Region { left_top: [69, 8], size: [5, 6], apart: 1 }));
         assert!(found.is_some_and(|f| (f.1 - 1.0).abs() < 0.01), "{found:?}");
         let everywhere: Vec<f64> = (0..8000).map(|i| f64::from(i % 7 == 0)).collect();
         assert_eq!(around(&everywhere, image), None);

@@ -31,6 +31,7 @@ use candidates::{Candidate, Family};
 use features::Features;
 use found::Found;
 use pilot::Pilot;
+use run::Asked;
 
 /// What is asked for where the budget is silent.
 const USUAL_ERROR: f64 = 0.02;
@@ -127,19 +128,19 @@ impl Planner<'_> {
         let (candidates, mut considered) = candidates::candidates(body, family, &features, wish.error);
         let possible: Vec<Candidate> =
             candidates.into_iter().filter(|c| self.scene(&c.request(body)).is_ok()).collect();
-        let image = scene.image();
+        let asked = Asked { planner: self, body, image: scene.image() };
         // What is wrong by too much is of no use, unless all that there is time for is.
         let useless = if wish.time_ms.is_none() { wish.error } else { f64::INFINITY };
-        let mut found = pilot::run_all(self, body, image, &possible, useless).await?;
+        let mut found = pilot::run_all(asked, &possible, useless).await?;
         let calibration = self.calibrations.of(self).await?;
-        let asked = body.pointer("/budget/samples").and_then(Value::as_u64).map_or(u32::MAX, |n| n as u32);
-        let most = self.limits.max_samples.min(asked);
-        let choose = |found: &Found| choose::choose(&found.pilots, &found.places, wish, image, &calibration, most);
+        let samples = body.pointer("/budget/samples").and_then(Value::as_u64).map_or(u32::MAX, |n| n as u32);
+        let most = self.limits.max_samples.min(samples);
+        let choose =
+            |found: &Found| choose::choose(&found.pilots, &found.places, wish, asked.image, &calibration, most);
         let mut chosen = choose(&found);
         for _ in 0..LOOKS {
-            let looked = (chosen.enough && found.deepen(self, body, image, chosen.index, chosen.samples).await?)
-                || ((chosen.enough || wish.time_ms.is_some())
-                    && found.confirm(self, body, image, chosen.index).await?);
+            let looked = (chosen.enough && found.deepen(asked, chosen.index, chosen.samples).await?)
+                || ((chosen.enough || wish.time_ms.is_some()) && found.confirm(asked, chosen.index).await?);
             if !looked && !std::mem::take(&mut found.places.hopeful) {
                 break;
             }

@@ -6,6 +6,7 @@
 
 use std::sync::Arc;
 
+use super::run::mean;
 use crate::film::Round;
 
 /// A part of the variance that is too small to look at more closely.
@@ -46,12 +47,12 @@ impl Places {
         let (random, _) = random(a, b, scale);
         let looked_at = a.iter().zip(b).filter(|(a, _)| 2 * a.samples <= last.samples);
         let known = looked_at.map(|(a, b)| {
-            let squared = apart(a, last, mean(&in_common([a, last], [b, other])) / (scale * scale));
+            let squared = apart(a, last, mean(in_common([a, last], [b, other])) / (scale * scale));
             Known { samples: a.samples, squared, random }
         });
         let more = a.iter().zip(b).take(FIRST).skip(1);
         let steps =
-            more.map(|(few, other)| (few.samples, mean(&in_common([&a[0], few], [&b[0], other])) / (scale * scale)));
+            more.map(|(few, other)| (few.samples, mean(in_common([&a[0], few], [&b[0], other])) / (scale * scale)));
         Self { known: known.collect(), steps: steps.collect(), more: 1.0, within, hopeful: true }
     }
 
@@ -96,11 +97,16 @@ impl Places {
     /// did: where it matters no such number is planned. Beyond them it falls no faster than evenly spread places can, nor more slowly than
     /// random ones.
     pub fn squared_after(&self, samples: f64) -> f64 {
+        self.squared(samples, if self.hopeful { 2 } else { 1 })
+    }
+
+    /// The same, beyond what was looked at falling by this power.
+    fn squared(&self, samples: f64, power: i32) -> f64 {
         let Some(last) = self.known.last() else { return 0.0 };
         let beyond = f64::from(last.samples) / samples;
         let at = self.known.iter().position(|k| f64::from(k.samples) >= samples).unwrap_or(0);
         let squared = if beyond < 1.0 {
-            last.squared * beyond.powi(if self.hopeful { 2 } else { 1 })
+            last.squared * beyond.powi(power)
         } else if f64::from(self.known[at].samples) == samples {
             self.known[at].squared
         } else {
@@ -120,7 +126,7 @@ impl Places {
     /// Whether P after `samples` is too small to matter beside this J², even if it falls no faster than that.
     pub fn is_small(&self, samples: u32, random: f64) -> bool {
         let n = f64::from(samples);
-        Self { hopeful: false, ..self.clone() }.squared_after(n) <= SMALL * random / n
+        self.squared(n, 1) <= SMALL * random / n
     }
 }
 
@@ -130,15 +136,10 @@ fn apart(few: &Round, more: &Round, squared: f64) -> f64 {
 }
 
 /// What two pictures differ by times what those of another seed do, of every pixel: (Iₙ − I_N) (I′ₙ − I′_N).
-pub fn in_common(a: [&Round; 2], b: [&Round; 2]) -> Vec<f64> {
+pub fn in_common<'a>(a: [&'a Round; 2], b: [&'a Round; 2]) -> impl Iterator<Item = f64> + 'a {
     let apart = |[few, more]: [&Round; 2], i: usize| f64::from(few.luminance[i]) - f64::from(more.luminance[i]);
-    let products = (0..a[0].luminance.len()).map(|i| apart(a, i) * apart(b, i));
-    products.map(|p| if p.is_finite() { p } else { 0.0 }).collect()
-}
-
-/// 0 of none.
-pub fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
+    let products = (0..a[0].luminance.len()).map(move |i| apart(a, i) * apart(b, i));
+    products.map(|p| if p.is_finite() { p } else { 0.0 })
 }
 
 /// J², relative, by what two seeds differ by from round to round, half of the variance of that; and of how many pixels it is:

@@ -3,18 +3,15 @@
 //! What is left out is the mean over the pixels of d₁ d₂, where d is the difference to the reference with seeds of their own: noise of the
 //! two is independent and averages to nothing, and places in a pixel are the same for both. What more samples take away is in `noise`.
 
-use serde_json::{Value, json};
-
-use super::Planner;
 use super::candidates::Candidate;
 use super::found::Found;
 use super::noise::{Places, random};
-use super::run::{Run, finish, mean};
+use super::run::{Asked, Run, mean};
 use crate::error::{Error, Result};
-use crate::scene::Window;
+use crate::scene::region::Region;
 
 /// Pixels of a pilot, about.
-const PIXELS: f64 = 4096.0;
+pub const PIXELS: f64 = 4096.0;
 /// Samples of a pilot.
 pub const SAMPLES: u32 = 16;
 /// Deviations that one in twenty is beyond, on one side.
@@ -55,42 +52,12 @@ pub fn chance(pixels: f64, numbers: f64) -> f64 {
     (1.0 + ONE_IN_TWENTY * variance.sqrt()).sqrt()
 }
 
-/// Some of the pixels of a part of the picture, about as many as a pilot has.
-pub fn some(left_top: [u32; 2], size: [u32; 2]) -> Window {
-    let apart = (f64::from(size[0]) * f64::from(size[1]) / PIXELS).sqrt().round().max(1.0) as u32;
-    Window { left_top, size, apart }
-}
-
-/// Runs a candidate on some pixels.
-///
-/// # Errors
-/// Those of the request.
-pub async fn run(
-    planner: &Planner<'_>,
-    body: &Value,
-    candidate: &Candidate,
-    window: Window,
-    samples: u32,
-    seed: u64,
-) -> Result<Run> {
-    let mut request = candidate.request(body);
-    request["budget"] = json!({"samples": samples.min(planner.limits.max_samples)});
-    request["seed"] = json!(seed);
-    finish(planner, request, window).await
-}
-
 /// Runs the pilots; the first candidate is the reference. One that leaves out more than one that leaves out too much for `most` is not run.
 ///
 /// # Errors
 /// Those of the requests.
-pub async fn run_all(
-    planner: &Planner<'_>,
-    body: &Value,
-    image: [u32; 2],
-    candidates: &[Candidate],
-    most: f64,
-) -> Result<Found> {
-    let window = some([0, 0], image);
+pub async fn run_all(asked: Asked<'_>, candidates: &[Candidate], most: f64) -> Result<Found> {
+    let region = Region::some(PIXELS, [0, 0], asked.image);
     let mut references: Option<([Run; 2], f64)> = None;
     let mut found =
         Found { pilots: Vec::new(), places: Places::default(), matter: 0.0, part: None, skipped: Vec::new() };
@@ -101,10 +68,7 @@ pub async fn run_all(
             found.skipped.push(candidate.skipped(format!("{less} leaves out less, and that is too much")));
             continue;
         }
-        let runs = [
-            run(planner, body, candidate, window, SAMPLES, 1).await?,
-            run(planner, body, candidate, window, SAMPLES, 2).await?,
-        ];
+        let runs = asked.run_two(candidate, region, SAMPLES).await?;
         let scale = references.as_ref().map_or_else(|| runs[0].mean(), |r| r.1);
         let (bias, bias_within) = match &references {
             Some(([a, b], _)) if !candidate.unbiased => {
@@ -126,7 +90,7 @@ pub async fn run_all(
             candidate: candidate.clone(),
             random,
             // There are more pixels in the picture, of the same kinds.
-            chance: chance(seen * f64::from(window.apart).powi(2), seen * a.len() as f64),
+            chance: chance(seen * f64::from(region.apart).powi(2), seen * a.len() as f64),
             bias,
             bias_within,
             scale,

@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::Planner;
+use super::candidates::Candidate;
 use crate::error::{Error, Result};
 use crate::film::{Film, Round};
 use crate::job::{Engine, Job, State};
-use crate::scene::Window;
+use crate::scene::region::Region;
 
 /// A finished pilot render.
 pub struct Run {
@@ -49,12 +50,44 @@ impl Drop for CancelOnDrop<'_> {
     }
 }
 
-/// Runs a window of a request's picture to its end, unseen.
+/// What is planned, for the runs of its pilots.
+#[derive(Clone, Copy)]
+pub struct Asked<'a> {
+    /// Runs them.
+    pub planner: &'a Planner<'a>,
+    /// The request.
+    pub body: &'a Value,
+    /// The picture's sides.
+    pub image: [u32; 2],
+}
+
+impl Asked<'_> {
+    /// Runs a candidate on some pixels.
+    ///
+    /// # Errors
+    /// Those of the request.
+    pub async fn run(&self, candidate: &Candidate, region: Region, samples: u32, seed: u64) -> Result<Run> {
+        let mut request = candidate.request(self.body);
+        request["budget"] = json!({"samples": samples.min(self.planner.limits.max_samples)});
+        request["seed"] = json!(seed);
+        finish(self.planner, request, region).await
+    }
+
+    /// Runs it with two seeds.
+    ///
+    /// # Errors
+    /// Those of the request.
+    pub async fn run_two(&self, candidate: &Candidate, region: Region, samples: u32) -> Result<[Run; 2]> {
+        Ok([self.run(candidate, region, samples, 1).await?, self.run(candidate, region, samples, 2).await?])
+    }
+}
+
+/// Runs a region of a request's picture to its end, unseen.
 ///
 /// # Errors
 /// Those of the request.
-pub async fn finish(planner: &Planner<'_>, request: Value, window: Window) -> Result<Run> {
-    let scene = planner.scene(&request)?.into_pilot(window);
+pub async fn finish(planner: &Planner<'_>, request: Value, region: Region) -> Result<Run> {
+    let scene = planner.scene(&request)?.into_pilot(region);
     let job = CancelOnDrop { engine: planner.engine, job: planner.engine.submit_pilot(request, scene) };
     let job = &job.job;
     let ended = job.watch().wait_for(|u| u.state.is_terminal()).await.map(drop).map_err(Error::internal);

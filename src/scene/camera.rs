@@ -213,3 +213,30 @@ impl From<&Volume> for Framing {
         Self::new(&volume.world_from_index(), volume.dims(), !matches!(volume.format(), "builtin" | "field"))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_part_of_the_picture_is_seen_as_in_the_whole() -> Result<()> {
+        let volume = crate::volume::builtin::build("sphere", 16, 0)?;
+        for perspective in [true, false] {
+            let (eye, up) = (DVec3::new(0.7, 0.5, 3.0), DVec3::Y);
+            let camera = Camera::look_at(eye, DVec3::new(0.1, 0.0, 0.0), up, 40.0, perspective)?;
+            let [whole, part] = [[0, 0], [30, 7]].map(|corner| camera.device_view([64, 48], corner, &volume));
+            for axis in 0..3 {
+                let moved = 30.0 * whole.right[axis] + 7.0 * whole.down[axis];
+                assert!(
+                    (part.plane[axis] - whole.plane[axis] - moved).abs() < 1e-4,
+                    "{:?}, {:?}",
+                    part.plane,
+                    whole.plane
+                );
+                let turned = if perspective { moved } else { 0.0 };
+                assert!((part.towards[axis] - whole.towards[axis] - turned).abs() < 1e-4, "{:?}", part.towards);
+            }
+        }
+        Ok(())
+    }
+}

@@ -9,6 +9,7 @@ pub mod lights;
 pub mod medium;
 pub mod phase;
 pub mod presets;
+pub(crate) mod region;
 pub mod transfer;
 pub mod window;
 
@@ -25,6 +26,7 @@ use crate::technique::{self, Field, Technique, View};
 use crate::volume::{Store, Volume};
 use camera::{Camera, Framing};
 use clip::Clip;
+use region::Region;
 
 /// The technique of a request that leaves it to the planner.
 pub const AUTO: &str = "auto";
@@ -53,24 +55,6 @@ pub enum Subject {
     Field(Arc<dyn Field>),
 }
 
-/// Every so manyth pixel, across and down, of a part of a picture.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Window {
-    /// Its corner, pixels of the picture.
-    pub left_top: [u32; 2],
-    /// Its sides, pixels of the picture.
-    pub size: [u32; 2],
-    /// How far apart its pixels are.
-    pub apart: u32,
-}
-
-impl Window {
-    /// Every `apart`-th pixel of a picture.
-    pub fn every(apart: u32, image: [u32; 2]) -> Self {
-        Self { left_top: [0, 0], size: image, apart: apart.max(1) }
-    }
-}
-
 /// A valid render request with its defaults resolved.
 #[derive(Clone)]
 pub struct Scene {
@@ -84,7 +68,7 @@ pub struct Scene {
     background: Background,
     budget: Budget,
     seed: u64,
-    pilot: Option<Window>,
+    pilot: Option<Region>,
 }
 
 /// The radius of the sphere around a volume's box, world units.
@@ -204,8 +188,8 @@ impl Scene {
     }
 
     /// Only these pixels of the picture, with what each had come to on the way.
-    pub(crate) fn into_pilot(self, window: Window) -> Self {
-        Self { pilot: Some(window), ..self }
+    pub(crate) fn into_pilot(self, region: Region) -> Self {
+        Self { pilot: Some(region), ..self }
     }
 
     /// Whether it has only some of its pixels, for a planner.
@@ -214,8 +198,8 @@ impl Scene {
     }
 
     /// The pixels of the picture that it has: but for a pilot all of them.
-    pub(crate) fn window(&self) -> Window {
-        self.pilot.unwrap_or(Window::every(1, self.image))
+    pub(crate) fn region(&self) -> Region {
+        self.pilot.unwrap_or(Region::every(1, self.image))
     }
 
     /// The view technique.

@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use super::bench::{Bench, Reads, Run};
+use super::measure::{measure, median};
 use crate::error::Result;
 
 /// The truth's noise, of the error asked for: of evenly spread samples, and of random ones.
@@ -19,16 +20,17 @@ const TURNS: usize = 3;
 /// A truth and how well it is known.
 pub(super) struct Known {
     values: Vec<f64>,
-    mean: f64,
     noise: f64,
 }
 
 impl Known {
-    /// The relative error of a run, less the truth's own.
-    pub fn error(&self, run: &Run) -> f64 {
-        let squares =
-            run.values.iter().zip(&self.values).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / self.values.len() as f64;
-        (squares / self.mean.powi(2) - self.noise.powi(2)).max(0.0).sqrt()
+    /// The relative error of a run, less what is random in the truth's own.
+    ///
+    /// # Errors
+    /// Those of [`measure`].
+    pub fn error(&self, run: &Run) -> Result<f64> {
+        let rmse = measure(std::slice::from_ref(&run.values), &self.values)?.rmse;
+        Ok((rmse.powi(2) - self.noise.powi(2)).max(0.0).sqrt())
     }
 }
 
@@ -64,10 +66,9 @@ pub(super) fn truth(bench: &Bench, reference: &Value, asked: f64) -> Result<Know
         let noise = 0.5 * stated * if random { 0.5f64.sqrt() } else { 1.0 };
         if noise <= most || samples >= MOST_TRUTH {
             let values: Vec<f64> = a.values.iter().zip(&b.values).map(|(a, b)| 0.5 * (a + b)).collect();
-            let mean = values.iter().sum::<f64>() / values.len() as f64;
-            let squares = a.values.iter().zip(&b.values).map(|(a, b)| (0.5 * (a - b)).powi(2)).sum::<f64>();
-            let noise = (squares / values.len() as f64).sqrt() / mean;
-            return Ok(Known { values, mean, noise });
+            // Each is wrong by half of what they differ by.
+            let noise = measure(&[a.values], &values)?.rmse;
+            return Ok(Known { values, noise });
         }
         let needed = (samples as f64 * (noise / most).powi(2)).ceil() as u64;
         samples = needed.clamp(2 * samples, 8 * samples).next_power_of_two().min(MOST_TRUTH);
@@ -81,8 +82,7 @@ pub(super) fn timed(bench: &Bench, request: &Value) -> Result<(Run, f64)> {
     while times.len() < REPEATS && run.device_ms < SHORT {
         times.push(bench.run(request, Reads::Luminance)?.device_ms);
     }
-    times.sort_by(f64::total_cmp);
-    Ok((run, times[times.len() / 2]))
+    Ok((run, median(&times)))
 }
 
 /// Device times of the plan and of the cheapest setting, medians of several taken in turns: the machine has other work
@@ -94,11 +94,7 @@ pub(super) fn in_turns(bench: &Bench, about_ms: f64, plan: &Value, cheapest: &Va
             times.push(bench.run(request, Reads::Mean)?.device_ms);
         }
     }
-    let [plan, cheapest] = times.map(|mut t| {
-        t.sort_by(f64::total_cmp);
-        t[t.len() / 2]
-    });
-    Ok((plan, cheapest))
+    Ok((median(&times[0]), median(&times[1])))
 }
 
 /// The least device time at which a setting is within the error, if that is less than `dearest`, and the samples: of random paths between
@@ -114,7 +110,7 @@ pub(super) fn least_ms(
     let mut errors: Vec<f64> = Vec::new();
     while samples <= MOST_SAMPLES {
         let (run, time) = timed(bench, &with_samples(setting, samples))?;
-        let error = known.error(&run);
+        let error = known.error(&run)?;
         if error <= asked {
             // Between two numbers of samples the error of random paths is known; of places that are spread evenly it jumps.
             let random = setting["technique"] == "volume_path" || setting["technique"] == "single_scatter";

@@ -178,7 +178,7 @@ fn outcome(bench: &Bench, scene: u64, request: &Value) -> Result<Outcome> {
     let known = truth(bench, &settings[0].1, asked)?;
     let plan = bench.plan(request)?;
     let (run, mut measured_ms) = timed(bench, &plan.request)?;
-    let true_error = known.error(&run);
+    let true_error = known.error(&run)?;
     // What is dearer than the plan, or than the cheapest so far, need not be tried any further.
     let mut cheapest: Option<(f64, String, Value)> =
         (true_error <= asked).then(|| (measured_ms, "the plan".into(), plan.request.clone()));
