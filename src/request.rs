@@ -57,6 +57,10 @@ pub struct VolumeRequest {
     /// Seed of a built-in volume that is made of random numbers.
     #[schemars(range(min = 0, max = 9_007_199_254_740_991u64))]
     pub seed: Option<u64>,
+    /// A coarser level of an uploaded or built-in volume: its voxels are the means of boxes 2^level times as wide as the smallest side of a voxel.
+    /// `step_voxels` is of the level's. Default 0, the volume as it is; the planner chooses one where it is not given.
+    #[schemars(range(min = 0, max = crate::volume::MOST_LEVEL))]
+    pub level: Option<u32>,
     /// A field technique's parameters, by technique.
     #[serde(flatten)]
     #[schemars(skip)]

@@ -10,6 +10,7 @@ pub mod medium;
 pub mod phase;
 pub mod presets;
 pub(crate) mod region;
+mod subject;
 pub mod transfer;
 pub mod window;
 
@@ -21,12 +22,13 @@ use serde_json::Value;
 use crate::config::Limits;
 use crate::error::{Error, Result};
 use crate::film::picture::Background;
-use crate::request::{self, BudgetRequest, CameraRequest, ImageRequest, RenderRequest, VolumeRequest};
-use crate::technique::{self, Field, Technique, View};
+use crate::request::{self, BudgetRequest, CameraRequest, ImageRequest, RenderRequest};
+use crate::technique::{self, Technique, View};
 use crate::volume::{Store, Volume};
 use camera::{Camera, Framing};
 use clip::Clip;
 use region::Region;
+pub use subject::Subject;
 
 /// The technique of a request that leaves it to the planner.
 pub const AUTO: &str = "auto";
@@ -44,15 +46,6 @@ pub struct Budget {
     pub time_ms: Option<u64>,
     /// The error, as the film estimates it.
     pub max_error: Option<f64>,
-}
-
-/// What is looked at.
-#[derive(Clone)]
-pub enum Subject {
-    /// A volume that is there.
-    Volume(Arc<Volume>),
-    /// A volume that is computed first.
-    Field(Arc<dyn Field>),
 }
 
 /// A valid render request with its defaults resolved.
@@ -143,7 +136,10 @@ impl Scene {
         };
         let view = parse(&own_parameters(technique, &request)?, &format!("/{}", technique.name))
             .map_err(|e| where_it_was_given(e, technique, &request))?;
-        let (subject, framing) = subject(request.volume.as_ref(), store, limits)?;
+        let (subject, framing) = subject::of_request(request.volume.as_ref(), store, limits)?;
+        if view.shows_labels() && request.volume.as_ref().is_some_and(|v| v.level.is_some_and(|l| l > 0)) {
+            return Err(Error::invalid("/volume/level", "there is no mean of labels", "0, or leave it out"));
+        }
         let camera = Camera::from_request(request.camera.as_ref(), &framing)?;
         let clip = Clip::from_request(request.clip.as_ref())?;
         if request.clip.is_some() && !view.clips() {
@@ -285,58 +281,4 @@ fn budget(request: &BudgetRequest, limits: &Limits) -> Budget {
     let open = request.time_ms.is_some() || request.max_error.is_some();
     let default = if open { limits.max_samples } else { DEFAULT_SAMPLES.min(limits.max_samples) };
     Budget { samples: request.samples.unwrap_or(default), time_ms: request.time_ms, max_error: request.max_error }
-}
-
-fn subject(request: Option<&VolumeRequest>, store: &Store, limits: &Limits) -> Result<(Subject, Framing)> {
-    let Some(request) = request else { return built_in("smoke", None, None, store) };
-    let given = usize::from(request.id.is_some()) + usize::from(request.builtin.is_some()) + request.field.len();
-    if given != 1 {
-        let permitted = "exactly one of id, builtin, or a field technique";
-        return Err(Error::invalid("/volume", format!("{given} sources are given"), permitted));
-    }
-    if request.builtin.is_none() {
-        for (name, set) in [("resolution", request.resolution.is_some()), ("seed", request.seed.is_some())] {
-            if set {
-                return Err(Error::invalid(
-                    format!("/volume/{name}"),
-                    "only for a built-in volume",
-                    "leave it out, or name a builtin",
-                ));
-            }
-        }
-    }
-    if let Some(id) = &request.id {
-        let volume = store.named(id, "/volume/id")?;
-        return Ok((Subject::Volume(volume.clone()), Framing::from(&*volume)));
-    }
-    if let Some(name) = &request.builtin {
-        return built_in(name, request.resolution, request.seed, store);
-    }
-    let (name, parameters) = request.field.iter().next().ok_or_else(|| Error::internal("a field without a name"))?;
-    let found = technique::find(name)
-        .and_then(|t| if let technique::Kind::Field(parse) = t.kind { Some((t, parse)) } else { None });
-    let (technique, parse) =
-        found.ok_or_else(|| Error::internal("the schema permits a field that is not in the list"))?;
-    let field = parse(&within_limits(technique, parameters, limits), &format!("/volume/{name}"), store)?;
-    let framing = field.framing();
-    Ok((Subject::Field(field), framing))
-}
-
-/// The parameters with a default number of photons that the limits permit.
-fn within_limits(technique: &Technique, parameters: &Value, limits: &Limits) -> Value {
-    let mut parameters = parameters.clone();
-    let default = (technique.schema)().pointer("/properties/photons/default").and_then(Value::as_u64);
-    if let (Some(fields), Some(default)) = (parameters.as_object_mut(), default) {
-        fields.entry("photons").or_insert(default.min(limits.max_photons).into());
-    }
-    parameters
-}
-
-fn built_in(name: &str, resolution: Option<u32>, seed: Option<u64>, store: &Store) -> Result<(Subject, Framing)> {
-    if !crate::volume::builtin::NAMES.contains(&name) {
-        let permitted = crate::volume::builtin::NAMES.join(", ");
-        return Err(Error::invalid("/volume/builtin", format!("there is no built-in volume '{name}'"), permitted));
-    }
-    let volume = store.builtin(name, resolution.unwrap_or(128) as usize, seed.unwrap_or(0))?;
-    Ok((Subject::Volume(volume.clone()), Framing::from(&*volume)))
 }

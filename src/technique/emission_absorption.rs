@@ -251,16 +251,19 @@ impl Parameters {
         self.styles().any() || self.regions.is_some()
     }
 
+    fn labels(&self) -> bool {
+        self.transfer_function.as_ref().is_some_and(TransferRequest::is_labels)
+    }
+
     fn interpolation(&self) -> Interpolation {
-        let labels = self.transfer_function.as_ref().is_some_and(TransferRequest::is_labels);
         let sample = self.cuda_sample.as_ref().is_some_and(|c| !c.linear);
-        let default = if labels || sample { Interpolation::Nearest } else { Interpolation::Trilinear };
+        let default = if self.labels() || sample { Interpolation::Nearest } else { Interpolation::Trilinear };
         self.interpolation.unwrap_or(default)
     }
 
     /// What cannot be had together.
     fn check_together(&self, at: &str) -> Result<()> {
-        let labels = self.transfer_function.as_ref().is_some_and(TransferRequest::is_labels);
+        let labels = self.labels();
         let plain = self.interpolation() == Interpolation::Trilinear && !self.styled();
         let reversed = self.order == "back_to_front";
         let rules = [

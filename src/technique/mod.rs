@@ -166,6 +166,10 @@ pub trait View: Send + Sync {
     fn clips(&self) -> bool {
         true
     }
+    /// Whether values are labels, of which there is no mean.
+    fn shows_labels(&self) -> bool {
+        false
+    }
     /// How its samples are taken, where they are random.
     fn random(&self) -> Option<Random> {
         None

@@ -51,8 +51,8 @@ impl Cache {
         self.entries.retain(|(other, _)| other != key);
     }
 
-    /// Bytes of all voxels held.
+    /// Bytes of all voxels held, with those of coarser levels.
     pub fn bytes(&self) -> u64 {
-        self.entries.iter().map(|(_, volume)| volume.bytes()).sum()
+        self.entries.iter().map(|(_, volume)| volume.bytes() + volume.level_bytes()).sum()
     }
 }

@@ -12,6 +12,7 @@ pub mod builtin;
 mod cache;
 mod inflate;
 mod info;
+mod levels;
 mod nifti;
 mod nrrd;
 mod nrrd_header;
@@ -26,6 +27,7 @@ mod store_files;
 mod voxels;
 
 pub use info::VolumeInfo;
+pub use levels::MOST_LEVEL;
 pub use nrrd_write::write_nrrd;
 pub use raw::{RawParams, RawQuery};
 pub use read::{FORMATS, VolumeLimits, read};
@@ -77,6 +79,7 @@ pub struct Volume {
     non_finite: u64,
     histogram: Histogram,
     bright_mean: OnceLock<f64>,
+    levels: levels::Levels,
 }
 
 impl Volume {
@@ -110,7 +113,8 @@ impl Volume {
             None => [0.0; 2],
         };
         let histogram = Histogram::new(&parts.voxels, parts.slope, parts.inter, range);
-        Ok(Self { parts, world_from_index, range, non_finite, histogram, bright_mean: OnceLock::new() })
+        let (bright_mean, levels) = Default::default();
+        Ok(Self { parts, world_from_index, range, non_finite, histogram, bright_mean, levels })
     }
 
     /// Voxels along x, y, z.

@@ -112,6 +112,10 @@ impl View for Parameters {
         coarse_step(self.step_voxels).into_iter().collect()
     }
 
+    fn shows_labels(&self) -> bool {
+        self.labels()
+    }
+
     fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
         let skip = self.empty_space_skipping && self.order == "front_to_back";
         let (opaque, named) = match &self.regions {

@@ -1,0 +1,128 @@
+//! Coarser levels of a volume, as of a mip map: level k has voxels 2ᵏ times as wide as the smallest side of the volume's own.
+//!
+//! A voxel of a level is the mean of what its box covers of the volume's, each by the part of it that is inside (area averaging); one that
+//! has no value does not count. Axes whose voxels are as wide already stay as they are. The box is the same, whatever the sizes, and so are
+//! range and histogram: colours that are chosen by them stay where they are.
+
+use std::ops::Range;
+use std::sync::{Arc, OnceLock};
+
+use glam::{DAffine3, DMat3, DVec3};
+
+use super::parallel::over_slices;
+use super::voxels::{Sample, Voxels, with_slice};
+use super::{NewVolume, Volume};
+
+/// The coarsest level that a request may name.
+pub const MOST_LEVEL: usize = 8;
+
+/// The levels of a volume that were asked for.
+pub(super) type Levels = [OnceLock<Arc<Volume>>; MOST_LEVEL];
+
+/// What of an axis one voxel of a level covers: the first voxel, and of it and those that follow the parts inside.
+struct Span {
+    first: usize,
+    parts: Vec<f64>,
+}
+
+impl Volume {
+    /// A coarser level, made when it is first asked for and kept as long as the volume; level 0 is the volume itself, and beyond the
+    /// coarsest there is only that.
+    pub fn level(self: &Arc<Self>, level: usize) -> Arc<Self> {
+        match level.min(MOST_LEVEL).checked_sub(1) {
+            None => self.clone(),
+            Some(place) => self.levels[place].get_or_init(|| Arc::new(self.averaged(level))).clone(),
+        }
+    }
+
+    /// Voxels along x, y, z of a level.
+    fn level_dims(&self, level: usize) -> [usize; 3] {
+        let spacing = self.spacing();
+        let target = spacing.into_iter().fold(f64::INFINITY, f64::min) * (1u64 << level) as f64;
+        // A hair less, so that what is as wide but for rounding stays.
+        [0, 1, 2].map(|a| {
+            let needed = (self.dims()[a] as f64 * spacing[a] / target - 1e-6).ceil() as usize;
+            needed.clamp(1, self.dims()[a])
+        })
+    }
+
+    fn averaged(&self, level: usize) -> Self {
+        let dims = self.level_dims(level);
+        let spans = [0, 1, 2].map(|a| spans(self.dims()[a], dims[a]));
+        let mut values = vec![0f32; dims.iter().product()];
+        with_slice!(self.voxels(), average, self.dims(), &spans, &mut values);
+        let voxels = match self.voxels() {
+            Voxels::U8(_) => Voxels::U8(values.iter().map(|v| v.round() as u8).collect()),
+            Voxels::I16(_) => Voxels::I16(values.iter().map(|v| v.round() as i16).collect()),
+            Voxels::U16(_) => Voxels::U16(values.iter().map(|v| v.round() as u16).collect()),
+            Voxels::F32(_) => Voxels::F32(values),
+        };
+        let non_finite = match &voxels {
+            Voxels::F32(values) => values.iter().filter(|v| v.is_nan()).count() as u64,
+            _ => 0,
+        };
+        let scale = DVec3::from_array([0, 1, 2].map(|a| self.dims()[a] as f64 / dims[a] as f64));
+        let DAffine3 { matrix3, translation } = self.world_from_index;
+        let parts = NewVolume {
+            dims,
+            spacing: [0, 1, 2].map(|a| self.spacing()[a] * scale[a]),
+            linear: None,
+            voxels,
+            name: format!("{}, level {level}", self.name()),
+            format: self.format().to_owned(),
+            file_affine: None,
+            unit: self.unit().to_owned(),
+            notes: Vec::new(),
+            ..self.parts
+        };
+        Self {
+            parts,
+            world_from_index: DAffine3 { matrix3: matrix3 * DMat3::from_diagonal(scale), translation },
+            range: self.range,
+            non_finite,
+            histogram: self.histogram.clone(),
+            bright_mean: OnceLock::from(self.bright_mean()),
+            levels: Levels::default(),
+        }
+    }
+
+    /// Bytes of the levels that were made.
+    pub(super) fn level_bytes(&self) -> u64 {
+        self.levels.iter().filter_map(OnceLock::get).map(|level| level.bytes()).sum()
+    }
+}
+
+/// What each of `to` equal parts of an axis of `from` voxels covers.
+fn spans(from: usize, to: usize) -> Vec<Span> {
+    let width = from as f64 / to as f64;
+    let span = |i: usize| {
+        let [start, end] = [i, i + 1].map(|i| i as f64 * width);
+        let voxels: Range<usize> = start.floor() as usize..(end.ceil() as usize).min(from);
+        let inside = |v: usize| (end.min(v as f64 + 1.0) - start.max(v as f64)).max(0.0);
+        Span { first: voxels.start, parts: voxels.map(inside).collect() }
+    };
+    (0..to).map(span).collect()
+}
+
+/// The means over products of spans.
+fn average<T: Sample>(voxels: &[T], [width, height, _]: [usize; 3], spans: &[Vec<Span>; 3], values: &mut [f32]) {
+    let [across, down, deep] = spans;
+    over_slices(values, across.len() * down.len(), |z, slice| {
+        for (i, value) in slice.iter_mut().enumerate() {
+            let (x, y, z) = (&across[i % across.len()], &down[i / across.len()], &deep[z]);
+            let (mut sum, mut weight) = (0.0, 0.0);
+            for (k, of_z) in z.parts.iter().enumerate() {
+                for (j, of_y) in y.parts.iter().enumerate() {
+                    let row = x.first + width * (y.first + j + height * (z.first + k));
+                    for (voxel, of_x) in voxels[row..].iter().zip(&x.parts) {
+                        let (voxel, part) = (voxel.to_f64(), of_x * of_y * of_z);
+                        if voxel.is_finite() {
+                            (sum, weight) = (sum + part * voxel, weight + part);
+                        }
+                    }
+                }
+            }
+            *value = (sum / weight) as f32;
+        }
+    });
+}
