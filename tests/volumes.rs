@@ -9,6 +9,8 @@ mod formats;
 mod grids;
 #[path = "volumes/hostile.rs"]
 mod hostile;
+#[path = "volumes/levels.rs"]
+mod levels;
 #[path = "volumes/scans.rs"]
 mod scans;
 #[path = "volumes/stores.rs"]

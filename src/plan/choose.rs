@@ -187,6 +187,7 @@ mod tests {
             technique: "volume_path".into(),
             own: json!({}),
             lights: None,
+            level: None,
             words: words.into(),
             unbiased: bias == 0.0,
             less: Vec::new(),

@@ -16,6 +16,7 @@ mod found;
 mod noise;
 mod pilot;
 mod run;
+mod settings;
 
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -123,9 +124,9 @@ impl Planner<'_> {
             let permitted = "a volume that is there; fetch the field and upload it";
             return Err(Error::invalid("/volume", "a plan needs to see the volume", permitted));
         };
-        let features = Features::of(&scene, volume, &candidates::reference(body, family).request(body));
+        let features = Features::of(&scene, volume, &settings::reference(body, family).request(body));
         let wish = Wish::of(&scene);
-        let (candidates, mut considered) = candidates::candidates(body, family, &features, wish.error);
+        let (candidates, mut considered) = settings::candidates(body, family, &features, wish.error);
         let possible: Vec<Candidate> =
             candidates.into_iter().filter(|c| self.scene(&c.request(body)).is_ok()).collect();
         let asked = Asked { planner: self, body, image: scene.image() };
@@ -183,8 +184,8 @@ impl Planner<'_> {
         let family = Family::of(body);
         let scene = self.reference(body, family)?;
         let Subject::Volume(volume) = scene.subject() else { return Ok(Vec::new()) };
-        let features = Features::of(&scene, volume, &candidates::reference(body, family).request(body));
-        let (candidates, _) = candidates::candidates(body, family, &features, f64::INFINITY);
+        let features = Features::of(&scene, volume, &settings::reference(body, family).request(body));
+        let (candidates, _) = settings::candidates(body, family, &features, f64::INFINITY);
         let requests = candidates.into_iter().map(|c| (c.words.clone(), c.request(body)));
         Ok(requests.filter(|(_, request)| self.scene(request).is_ok()).collect())
     }
@@ -214,7 +215,7 @@ impl Planner<'_> {
             _ => body.clone(),
         };
         self.scene(&as_it_came)?;
-        self.scene(&candidates::reference(body, family).request(body))
+        self.scene(&settings::reference(body, family).request(body))
     }
 
     fn scene(&self, request: &Value) -> Result<Scene> {
