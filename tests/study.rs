@@ -3,18 +3,19 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test says what is wrong by panicking")]
 
 mod common;
+#[path = "study/planner.rs"]
+mod planner;
 
 use std::sync::{Mutex, PoisonError};
 
 use clap::Parser;
 use cloudchamber::config::{DeviceArgs, Limits};
-use cloudchamber::study::bench::{Bench, Reads};
+use cloudchamber::study::bench::Bench;
 use cloudchamber::study::experiments::EXPERIMENTS;
 use cloudchamber::study::record::{Line, Record};
 use cloudchamber::study::stability::stability;
 use cloudchamber::study::verdict::Verdict;
 use cloudchamber::study::{CASES, Scale, study};
-use serde_json::{Value, json};
 
 #[derive(Parser)]
 struct Flags {
@@ -101,61 +102,5 @@ fn a_bias_is_told_from_noise() {
         assert!(bias < -0.5 && within < 0.02, "light scattered once is half of it: {bias} ± {within}");
         let cheap = &record.equal_error[0];
         assert!(cheap.rmse.is_some_and(|e| e <= 0.1), "{cheap:?}");
-    });
-}
-
-/// What a plan's picture is wrong by, against the reference with many samples, and what was asked for.
-fn planned(bench: &Bench, request: &Value, samples: u64) -> [f64; 2] {
-    let plan = bench.plan(request).unwrap();
-    let (_, mut reference) = bench.settings(request).unwrap().swap_remove(0);
-    // What is random in the truth is independent of the plan's: what two seeds of it differ by.
-    reference["budget"] = json!({"samples": samples / 2});
-    let [a, b] = [98, 99].map(|seed| {
-        reference["seed"] = json!(seed);
-        bench.run(&reference, Reads::Luminance).unwrap().values
-    });
-    let truth: Vec<f64> = a.iter().zip(&b).map(|(a, b)| 0.5 * (a + b)).collect();
-    let found = bench.run(&plan.request, Reads::Luminance).unwrap().values;
-    let mean = truth.iter().sum::<f64>() / truth.len() as f64;
-    let squares = found.iter().zip(&truth).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / truth.len() as f64;
-    eprintln!("{}: {} samples, {}", plan.technique, plan.samples, plan.options);
-    let own = a.iter().zip(&truth).map(|(a, t)| (a - t).powi(2)).sum::<f64>() / truth.len() as f64;
-    [((squares - own) / mean.powi(2)).max(0.0).sqrt(), request["budget"]["max_error"].as_f64().unwrap()]
-}
-
-#[test]
-fn what_is_small_thin_or_sharp_is_not_dropped() {
-    on_a_bench(|bench| {
-        let image = json!({"width": 128, "height": 128});
-        let points = json!([{"value": 0, "color": [0.3, 0.3, 0.3], "opacity_per_unit": 0}, {"value": 1, "color": [1, 1, 1], "opacity_per_unit": 60}]);
-        let looked_at = |volume: &Value, error: f64| {
-            json!({"technique": "auto", "volume": volume, "image": image, "budget": {"max_error": error},
-                "camera": {"eye": [0.3, 0.4, 3], "up": [0, 1, 0], "fov_y_deg": 36}, "emission_absorption": {"transfer_function": {"points": points}}})
-        };
-        let bright = |p: [f64; 3]| if p.iter().all(|v| v.abs() < 0.03) { 1.0 } else { 0.004 };
-        let detail = bench.floats([48; 3], [2.0; 3], bright).unwrap();
-        let shell = |p: [f64; 3]| f64::from(u8::from((p.iter().map(|v| v * v).sum::<f64>().sqrt() - 0.7).abs() < 0.03));
-        let shell = bench.floats([48; 3], [2.0; 3], shell).unwrap();
-        let mut peak = looked_at(&json!({"builtin": "smoke", "resolution": 48}), 0.15);
-        peak.as_object_mut().unwrap().remove("emission_absorption");
-        peak["medium"] =
-            json!({"sigma_t_per_unit": 8, "albedo": 0.95, "phase": {"type": "henyey_greenstein", "g": 0.93}});
-        // The sun is behind the cloud: what comes through is the forward peak, scattered a few times.
-        peak["lights"] =
-            json!([{"type": "sun", "direction": [-0.3, -0.4, -3], "irradiance": 3}, {"type": "sky", "radiance": 0.05}]);
-        // A lamp of a few pixels, seen past the cloud: hardly one of them is a pilot's.
-        let mut lamp = looked_at(&json!({"builtin": "gaussian", "resolution": 32}), 0.05);
-        lamp.as_object_mut().unwrap().remove("emission_absorption");
-        lamp["medium"] = json!({"sigma_t_per_unit": 1, "albedo": 0.5});
-        lamp["lights"] = json!([{"type": "sphere", "position": [0.73, 0.8, -0.3], "radius": 0.03, "radiance": 60}, {"type": "sky", "radiance": 0.2}]);
-        for (name, request, samples) in [
-            ("detail", looked_at(&detail, 0.02), 256),
-            ("shell", looked_at(&shell, 0.03), 256),
-            ("peak", peak, 1500),
-            ("lamp", lamp, 1500),
-        ] {
-            let [error, asked] = planned(bench, &request, samples);
-            assert!(error <= asked, "{name}: {error} for {asked}");
-        }
     });
 }

@@ -47,6 +47,8 @@ pub(super) struct Live {
     look: bool,
     result: Option<Value>,
     view: Option<ViewRun>,
+    /// What the device took for pictures of the field while it had fewer histories.
+    earlier_time: Duration,
     /// The picture when the field had half its histories.
     half: Option<Film>,
     field_error: Option<f64>,
@@ -70,6 +72,7 @@ impl Live {
             look: false,
             result: None,
             view: None,
+            earlier_time: Duration::ZERO,
             half: None,
             field_error: None,
             motion: Motion::new(),
@@ -110,6 +113,7 @@ impl Live {
         self.last_frame = None;
         self.unseen = false;
         self.half = None;
+        self.earlier_time = Duration::ZERO;
         self.learn_motion();
         self.job.started();
         let complete = self.job.lock().complete_field.clone();
@@ -174,7 +178,7 @@ impl Live {
             }
         }
         self.volume = Some(volume);
-        self.view = Some(view);
+        self.earlier_time += self.view.replace(view).map_or(Duration::ZERO, |earlier| earlier.device_time);
         Ok(())
     }
 
@@ -283,7 +287,7 @@ impl Live {
         let Some(view) = &self.view else { return Ok(()) };
         let background = self.scene.as_ref().map_or(Background::default(), Scene::background);
         let film = Film { field_error: self.field_error, background, ..view.film(context)? };
-        let device_time = view.device_time + self.field.as_ref().map_or(Duration::ZERO, |f| f.device_time);
+        let device_time = self.earlier_time + view.device_time + self.field.as_ref().map_or(Duration::ZERO, |f| f.device_time);
         let snapshot = Snapshot {
             film: Arc::new(film),
             generation: self.generation,

@@ -111,7 +111,7 @@ async fn measure(planner: &Planner<'_>, technique: &str) -> Result<Factors> {
         for seed in 0..4 {
             let request = json!({"technique": technique, "volume": {"builtin": "smoke", "resolution": 64}, "seed": seed,
                 "image": {"width": LARGE, "height": LARGE}, "budget": {"samples": SAMPLES}});
-            let run = run::finish(planner, request, Region::every(apart, [LARGE, LARGE])).await?;
+            let run = run::finish(planner, request, Region::every(apart, [LARGE, LARGE]), None).await?;
             least = [least[0].min(run.ms[0]), least[1].min(run.ms[1] / run.pixels as f64)];
         }
         Ok(least)

@@ -105,6 +105,7 @@ impl Candidate {
             words: self.words.clone(),
             technique: self.technique.clone(),
             samples: None,
+            photons: None,
             device_ms: None,
             error: None,
             bias: None,

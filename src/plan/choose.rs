@@ -2,6 +2,7 @@
 
 use super::calibration::Calibration;
 use super::noise::Places;
+use super::photons::Photons;
 use super::pilot::Pilot;
 use super::{Considered, Predicted, Wish};
 
@@ -11,13 +12,15 @@ pub(super) const AIM: f64 = 0.99;
 const TIME_FACTOR: f64 = 1.5;
 /// And errors.
 const ERROR_FACTOR: f64 = 1.25;
+/// How many ways to split what is asked for between a view and its field are tried.
+const PARTS: u32 = 40;
 
 /// What was chosen.
 pub struct Chosen {
     /// The pilot's index.
     pub index: usize,
-    /// Samples per pixel.
-    pub samples: u32,
+    /// How much of it.
+    pub amount: Amount,
     /// Whether it is enough for the error asked for.
     pub enough: bool,
     /// Predicted.
@@ -30,149 +33,193 @@ pub struct Chosen {
     pub considered: Vec<Considered>,
 }
 
-impl Pilot {
-    /// The square of the noise after `samples`, with as much of the random part as `by_chance`.
-    fn squared_after(&self, samples: f64, places: &Places, by_chance: f64) -> f64 {
-        places.squared_after(samples) + by_chance * by_chance * self.random / samples
-    }
-
-    /// The whole error after `samples`.
-    pub fn error_after(&self, samples: f64, places: &Places) -> f64 {
-        (self.squared_after(samples, places, 1.0) + self.bias * self.bias).sqrt()
-    }
-
-    /// The fewest samples after which the error is at most `error`; none where the bias is in the way.
-    fn samples_for(&self, error: f64, places: &Places, most: u32) -> Option<u32> {
-        let room = error * error - (self.bias + self.bias_within).powi(2);
-        let enough = |n: u32| self.squared_after(f64::from(n), places, self.chance) <= room;
-        // What was looked at need not fall everywhere; beyond it, it does.
-        let last = places.last().min(most);
-        let looked_at = (1..=last).find(|n| room > 0.0 && enough(*n));
-        looked_at.or_else(|| {
-            (room > 0.0 && enough(most)).then(|| {
-                let (mut low, mut high) = (last, most);
-                while high - low > 1 {
-                    let middle = low + (high - low) / 2;
-                    if enough(middle) { high = middle } else { low = middle }
-                }
-                high
-            })
-        })
-    }
+/// How much of a setting.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Amount {
+    /// Samples per pixel.
+    pub samples: u32,
+    /// Photons, where a field is to be computed first.
+    pub photons: Option<u64>,
 }
 
-/// Chooses for a picture of `image` pixels of at most `most` samples.
-pub fn choose(
-    pilots: &[Pilot],
-    places: &Places,
-    wish: Wish,
-    image: [u32; 2],
-    calibration: &Calibration,
-    most: u32,
-) -> Chosen {
-    let pixels = f64::from(image[0]) * f64::from(image[1]);
-    let cost = |p: &Pilot, samples: u32| {
+/// What is chosen from, and for what.
+pub struct Choice<'a> {
+    /// The settings.
+    pub pilots: &'a [Pilot],
+    /// What the places in a pixel miss.
+    pub places: &'a Places,
+    /// What is asked for.
+    pub wish: Wish,
+    /// The picture's sides.
+    pub image: [u32; 2],
+    /// What is known of the device.
+    pub calibration: &'a Calibration,
+    /// The most samples that are permitted.
+    pub most: u32,
+    /// The photons of a field that is looked at.
+    pub photons: Option<&'a Photons>,
+}
+
+impl Choice<'_> {
+    /// What of a setting's picture is there before its first sample, and what a sample takes, ms.
+    fn picture_ms(&self, p: &Pilot) -> [f64; 2] {
         let technique = &p.candidate.technique;
         let seen = |q: &&Pilot| q.whole.is_some() && q.candidate.technique == *technique;
-        let [besides, sample] = match (p.whole, pilots.iter().find(seen)) {
+        match (p.whole, self.pilots.iter().find(seen)) {
             (Some(whole), _) => whole,
             // Of another setting of it the whole picture was begun: this one costs as much more there as in its pilot.
             (None, Some(Pilot { whole: Some(whole), ms_per_sample, .. })) if *ms_per_sample > 0.0 => {
                 whole.map(|ms| ms * p.ms_per_sample / ms_per_sample)
             }
             _ => {
-                let sample = p.ms_per_sample * pixels * calibration.factor(technique, pixels);
-                [calibration.besides(technique) * sample, sample]
+                let pixels = f64::from(self.image[0]) * f64::from(self.image[1]);
+                let sample = p.ms_per_sample * pixels * self.calibration.factor(technique, pixels);
+                [self.calibration.besides(technique) * sample, sample]
             }
-        };
-        besides + sample * f64::from(samples)
-    };
-    let in_time = |p: &Pilot| {
-        let sample = cost(p, 1) - cost(p, 0);
-        wish.time_ms.map(|t| (((t - cost(p, 0)) / sample).floor().max(1.0) as u32).min(most))
-    };
-    let for_error = |p: &Pilot| p.samples_for(AIM * wish.error, places, most);
-    let fits = |p: &Pilot, n: u32| wish.time_ms.is_none_or(|t| cost(p, n) <= t);
-    let plan_of = |p: &Pilot| for_error(p).filter(|n| fits(p, *n) && wish.says_error);
-    let by_cost = |i: &usize| plan_of(&pilots[*i]).map_or(f64::INFINITY, |n| cost(&pilots[*i], n));
-    let by_error = |i: &usize| {
-        let p = &pilots[*i];
-        in_time(p).map_or(p.bias, |n| p.error_after(f64::from(n), places) + p.bias_within)
-    };
-    let all = || 0..pilots.len();
-    let enough = all().filter(|i| plan_of(&pilots[*i]).is_some()).min_by(|a, b| by_cost(a).total_cmp(&by_cost(b)));
-    let index = enough.or_else(|| all().min_by(|a, b| by_error(a).total_cmp(&by_error(b)))).unwrap_or(0);
-    let best = &pilots[index];
-    let samples = plan_of(best).or_else(|| in_time(best)).unwrap_or(most);
-    let n = f64::from(samples);
-    let (time, error) = (cost(best, samples), best.error_after(n, places));
-    let considered = pilots
-        .iter()
-        .map(|p| {
-            let samples = if wish.says_error { for_error(p) } else { in_time(p) };
-            considered(p, places, samples.map(|n| (n, cost(p, n))), wish)
-        })
-        .collect();
-    Chosen {
-        index,
-        samples,
-        enough: enough.is_some(),
-        device_ms: Predicted { value: time, interval: [time / TIME_FACTOR, time * TIME_FACTOR] },
-        error: Predicted { value: error, interval: [error / ERROR_FACTOR, (error + best.bias_within) * ERROR_FACTOR] },
-        reasons: vec![reason(best, samples, time, error, enough.is_some(), wish)],
-        considered,
+        }
     }
+
+    /// Device time, ms.
+    fn cost(&self, p: &Pilot, amount: Amount) -> f64 {
+        let [besides, sample] = self.picture_ms(p);
+        let field = self.photons.zip(amount.photons).map_or(0.0, |(photons, n)| photons.cost(n, besides + sample));
+        field + besides + sample * f64::from(amount.samples)
+    }
+
+    fn error(&self, p: &Pilot, amount: Amount) -> f64 {
+        let of_field = self.photons.zip(amount.photons).map_or(0.0, |(photons, n)| photons.squared_after(n, 1.0));
+        (p.error_after(f64::from(amount.samples), self.places).powi(2) + of_field).sqrt()
+    }
+
+    /// The cheapest amount that is wrong by no more than what is asked for.
+    fn for_error(&self, p: &Pilot) -> Option<Amount> {
+        let error = AIM * self.wish.error;
+        let samples = |error: f64| p.samples_for(error, self.places, self.most);
+        let Some(photons) = self.photons else {
+            return samples(error).map(|samples| Amount { samples, photons: None });
+        };
+        let split = |part: f64| {
+            let samples = samples(part.sqrt() * error)?;
+            let view = p.squared_after(f64::from(samples), self.places, p.chance) + (p.bias + p.bias_within).powi(2);
+            let photons = photons.needed(error * error - view)?;
+            Some(Amount { samples, photons: Some(photons) })
+        };
+        parts().filter_map(split).min_by(|a, b| self.cost(p, *a).total_cmp(&self.cost(p, *b)))
+    }
+
+    /// The best that there is time for, where that is asked for.
+    fn in_time(&self, p: &Pilot) -> Option<Amount> {
+        let [besides, sample] = self.picture_ms(p);
+        let samples = |ms: f64| (((ms - besides) / sample).floor().max(1.0) as u32).min(self.most);
+        let time = self.wish.time_ms?;
+        let Some(photons) = self.photons else { return Some(Amount { samples: samples(time), photons: None }) };
+        let left = time - photons.cost(0, besides + sample);
+        let split = |part: f64| {
+            let photons = photons.in_time((1.0 - part) * left);
+            let left = time - self.photons.map_or(0.0, |p| p.cost(photons, besides + sample));
+            Amount { samples: samples(left), photons: Some(photons) }
+        };
+        parts().map(split).min_by(|a, b| self.error(p, *a).total_cmp(&self.error(p, *b)))
+    }
+
+    /// What is enough, and in time.
+    fn enough(&self, p: &Pilot) -> Option<Amount> {
+        let in_time = |amount: &Amount| self.wish.time_ms.is_none_or(|t| self.cost(p, *amount) <= t);
+        self.for_error(p).filter(|amount| self.wish.says_error && in_time(amount))
+    }
+
+    /// Chooses.
+    pub fn choose(&self) -> Chosen {
+        let Self { pilots, wish, .. } = *self;
+        let by_cost = |i: &usize| self.enough(&pilots[*i]).map_or(f64::INFINITY, |n| self.cost(&pilots[*i], n));
+        let by_error = |i: &usize| {
+            let p = &pilots[*i];
+            self.in_time(p).map_or(p.bias, |n| self.error(p, n) + p.bias_within)
+        };
+        let all = || 0..pilots.len();
+        let enough =
+            all().filter(|i| by_cost(i).is_finite()).min_by(|a, b| by_cost(a).total_cmp(&by_cost(b)));
+        let index = enough.or_else(|| all().min_by(|a, b| by_error(a).total_cmp(&by_error(b)))).unwrap_or(0);
+        let best = &pilots[index];
+        let most = Amount { samples: self.most, photons: self.photons.map(|p| p.given.unwrap_or(p.most)) };
+        let amount = self.enough(best).or_else(|| self.in_time(best)).unwrap_or(most);
+        let (time, error) = (self.cost(best, amount), self.error(best, amount));
+        let considered = pilots.iter().map(|p| {
+            let amount = if wish.says_error { self.for_error(p) } else { self.in_time(p) };
+            self.considered(p, amount.map(|n| (n, self.cost(p, n))))
+        });
+        Chosen {
+            index,
+            amount,
+            enough: enough.is_some(),
+            device_ms: Predicted { value: time, interval: [time / TIME_FACTOR, time * TIME_FACTOR] },
+            error: Predicted {
+                value: error,
+                interval: [error / ERROR_FACTOR, (error + best.bias_within) * ERROR_FACTOR],
+            },
+            reasons: vec![self.reason(best, amount, [time, error], enough.is_some())],
+            considered: considered.collect(),
+        }
+    }
+
+    /// `needed` is what the error asked for takes, or what fits into the time where only that was asked for, and its time.
+    fn considered(&self, p: &Pilot, needed: Option<(Amount, f64)>) -> Considered {
+        let (bias, wish) = (p.bias + p.bias_within, self.wish);
+        let late = |ms: f64| wish.time_ms.filter(|t| wish.says_error && ms > *t);
+        let why = match needed {
+            Some((n, ms)) if late(ms).is_some() => format!("{n} would bring it there, but in about {ms:.0} ms"),
+            Some((n, _)) => format!("{n} bring it to {}", percent(self.error(p, n))),
+            None if bias >= AIM * wish.error => format!("wrong by up to {} however many samples it takes", percent(bias)),
+            None if self.photons.is_some() => "more photons or samples than are permitted would be needed".into(),
+            None => "more samples than are permitted would be needed".into(),
+        };
+        Considered {
+            words: p.candidate.words.clone(),
+            technique: p.candidate.technique.clone(),
+            samples: needed.map(|e| e.0.samples),
+            photons: needed.and_then(|e| e.0.photons),
+            device_ms: needed.map(|e| e.1),
+            error: needed.map(|(n, _)| self.error(p, n)),
+            bias: Some(p.bias),
+            enough: needed.is_some_and(|(_, ms)| late(ms).is_none()),
+            why,
+        }
+    }
+
+    fn reason(&self, best: &Pilot, amount: Amount, [time, error]: [f64; 2], enough: bool) -> String {
+        let (words, wish) = (&best.candidate.words, self.wish);
+        let [asked, error] = [wish.error, error].map(percent);
+        match (enough, wish.time_ms) {
+            (true, _) => {
+                format!("{words}: the cheapest that is within {asked}: {amount}, about {time:.1} ms on the device")
+            }
+            (false, Some(t)) if wish.says_error => {
+                format!("nothing is within {asked} in {t} ms; {words} comes nearest: {amount}, about {error}")
+            }
+            (false, Some(t)) => format!("{words}: the most accurate in {t} ms: {amount}, about {error}"),
+            (false, None) => {
+                format!("nothing that is permitted is within {asked}; {words} comes nearest, with {error}")
+            }
+        }
+    }
+}
+
+impl std::fmt::Display for Amount {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if let Some(photons) = self.photons {
+            write!(f, "{photons} photons, ")?;
+        }
+        write!(f, "{} samples", self.samples)
+    }
+}
+
+/// Parts of a squared error, or of a time, that a view may have where the rest is its field's.
+fn parts() -> impl Iterator<Item = f64> {
+    (0..=PARTS).map(|i| 0.5 - 0.49 * (std::f64::consts::PI * f64::from(i) / f64::from(PARTS)).cos())
 }
 
 fn percent(v: f64) -> String {
     format!("{:.2} %", 100.0 * v)
-}
-
-/// `needed` are the samples for the error asked for, or that fit into the time where only that was asked for, and their time.
-fn considered(p: &Pilot, places: &Places, needed: Option<(u32, f64)>, wish: Wish) -> Considered {
-    let bias = p.bias + p.bias_within;
-    let late = |ms: f64| wish.time_ms.filter(|t| wish.says_error && ms > *t);
-    let why = match needed {
-        Some((n, ms)) if late(ms).is_some() => format!("{n} samples would bring it there, but in about {ms:.0} ms"),
-        Some((n, _)) => format!("{n} samples bring it to {}", percent(p.error_after(f64::from(n), places))),
-        None if bias >= AIM * wish.error => format!("wrong by up to {} however many samples it takes", percent(bias)),
-        None => "more samples than are permitted would be needed".into(),
-    };
-    Considered {
-        words: p.candidate.words.clone(),
-        technique: p.candidate.technique.clone(),
-        samples: needed.map(|e| e.0),
-        device_ms: needed.map(|e| e.1),
-        error: needed.map(|(n, _)| p.error_after(f64::from(n), places)),
-        bias: Some(p.bias),
-        enough: needed.is_some_and(|(_, ms)| late(ms).is_none()),
-        why,
-    }
-}
-
-fn reason(best: &Pilot, samples: u32, time: f64, error: f64, enough: bool, wish: Wish) -> String {
-    let words = &best.candidate.words;
-    match (enough, wish.time_ms) {
-        (true, _) => {
-            format!(
-                "{words}: the cheapest that is within {}: {samples} samples, about {time:.1} ms on the device",
-                percent(wish.error)
-            )
-        }
-        (false, Some(t)) if wish.says_error => format!(
-            "nothing is within {} in {t} ms; {words} comes nearest: {samples} samples, about {}",
-            percent(wish.error),
-            percent(error)
-        ),
-        (false, Some(t)) => {
-            format!("{words}: the most accurate in {t} ms: {samples} samples, about {}", percent(error))
-        }
-        (false, None) => format!(
-            "nothing that is permitted is within {}; {words} comes nearest, with {}",
-            percent(wish.error),
-            percent(error)
-        ),
-    }
 }
 
 #[cfg(test)]
@@ -204,27 +251,23 @@ mod tests {
         }
     }
 
-    fn chosen(pilots: &[Pilot], error: f64, time_ms: Option<f64>, says_error: bool) -> Chosen {
-        choose(
-            pilots,
-            &Places::default(),
-            Wish { error, time_ms, says_error },
-            [100, 100],
-            &Calibration::default(),
-            1000,
-        )
+    fn chosen(pilots: &[Pilot], error: f64, time_ms: Option<f64>, photons: Option<&Photons>) -> Chosen {
+        let says_error = time_ms.is_none() || photons.is_some();
+        let wish = Wish { error, time_ms, says_error };
+        let (places, calibration) = (&Places::default(), &Calibration::default());
+        Choice { pilots, places, wish, image: [100, 100], calibration, most: 1000, photons }.choose()
     }
 
     #[test]
     fn the_cheapest_that_is_enough_is_taken() {
         let pilots = [pilot("all", 1.0, 0.0, 10.0), pilot("some", 1.0, 0.05, 2.0), pilot("few", 1.0, 0.5, 1.0)];
         // 0.99 × 0.2 = 0.198: √(0.198² − 0.05²) = 0.1916, 28 samples of 2 ms.
-        let loose = chosen(&pilots, 0.2, None, true);
-        assert_eq!((loose.index, loose.samples), (1, 28));
+        let loose = chosen(&pilots, 0.2, None, None);
+        assert_eq!((loose.index, loose.amount.samples), (1, 28));
         assert!((loose.device_ms.value - 56.0).abs() < 1e-9 && loose.error.value <= 0.198, "{:?}", loose.device_ms);
         // 0.0495 is less than the bias of 0.05: all paths are needed, 409 of them.
-        let tight = chosen(&pilots, 0.05, None, true);
-        assert_eq!((tight.index, tight.samples), (0, 409));
+        let tight = chosen(&pilots, 0.05, None, None);
+        assert_eq!((tight.index, tight.amount.samples), (0, 409));
         assert!(tight.considered[1].why.contains("however many"), "{:?}", tight.considered[1]);
     }
 

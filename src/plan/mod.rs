@@ -14,11 +14,12 @@ mod choose;
 pub mod features;
 mod found;
 mod noise;
+mod photons;
 mod pilot;
+mod reply;
 mod run;
 mod settings;
 
-use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::config::Limits;
@@ -30,8 +31,11 @@ pub use calibration::Calibrations;
 pub use candidates::is_auto;
 use candidates::{Candidate, Family};
 use features::Features;
+use choose::{Choice, Chosen};
 use found::Found;
+use photons::{Photons, Simulated};
 use pilot::Pilot;
+pub use reply::{Considered, Plan, Predicted};
 use run::Asked;
 
 /// What is asked for where the budget is silent.
@@ -42,57 +46,13 @@ const LOOKS: usize = 12;
 /// Of fewer samples than these the film knows its noise less well than a pilot.
 const FEW: u32 = 8;
 
-/// A number with the interval that it is expected in.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Predicted {
-    /// The expectation.
-    pub value: f64,
-    /// The least and the most that it should be, in about nine of ten cases.
-    pub interval: [f64; 2],
-}
-
-/// A setting that was considered.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Considered {
-    /// What it is, in words.
-    pub words: String,
-    /// Its technique.
-    pub technique: String,
-    /// Samples per pixel that it would take for the error asked for, or could take in the time.
-    pub samples: Option<u32>,
-    /// What it would take, device milliseconds.
-    pub device_ms: Option<f64>,
-    /// What it would be wrong by, relative.
-    pub error: Option<f64>,
-    /// What it is wrong by however many samples it takes.
-    pub bias: Option<f64>,
-    /// Whether it is enough.
-    pub enough: bool,
-    /// Why it is, or is not.
-    pub why: String,
-}
-
-/// A plan.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Plan {
-    /// The technique.
-    pub technique: String,
-    /// Its own parameters.
-    pub options: Value,
-    /// Samples per pixel.
-    pub samples: u32,
-    /// Time on the device, ms.
-    pub device_ms: Predicted,
-    /// The error, relative.
-    pub error: Predicted,
-    /// Why, in words.
-    pub reasons: Vec<String>,
-    /// Every setting that was considered.
-    pub considered: Vec<Considered>,
-    /// What the scene is like.
-    pub features: Features,
-    /// The request to post: this plan carried out.
-    pub request: Value,
+/// What is looked at.
+struct Seen {
+    /// As the reference shows it.
+    scene: Scene,
+    reference: Candidate,
+    simulated: Option<Simulated>,
+    features: Features,
 }
 
 /// What planning needs.
@@ -111,7 +71,7 @@ impl Planner<'_> {
     /// Plans a request whose technique is `auto`, or a view of which only what is not given is planned.
     ///
     /// # Errors
-    /// Those of the request; [`Error::Invalid`] for a volume that is yet to be computed.
+    /// Those of the request.
     pub async fn plan(&self, body: &Value) -> Result<Plan> {
         if !body.is_object() {
             return Err(Error::invalid("", "not an object", "a JSON object such as a render's"));
@@ -119,53 +79,87 @@ impl Planner<'_> {
         // One for all of its pilots.
         let _place = self.engine.reserve()?;
         let family = Family::of(body);
-        let scene = self.reference(body, family)?;
-        let Subject::Volume(volume) = scene.subject() else {
-            let permitted = "a volume that is there; fetch the field and upload it";
-            return Err(Error::invalid("/volume", "a plan needs to see the volume", permitted));
-        };
-        let features = Features::of(&scene, volume, &settings::reference(body, family).request(body));
-        let wish = Wish::of(&scene);
-        let (candidates, mut considered) = settings::candidates(body, family, &features, wish.error);
+        let seen = self.see(body, family).await?;
+        let wish = Wish::of(&seen.scene);
+        let (candidates, mut considered) = settings::candidates(body, family, &seen.features, wish.error);
         let possible: Vec<Candidate> =
             candidates.into_iter().filter(|c| self.scene(&c.request(body)).is_ok()).collect();
-        let asked = Asked { planner: self, body, image: scene.image() };
+        let field = seen.simulated.as_ref().map(Simulated::volume);
+        let asked = Asked { planner: self, body, image: seen.scene.image(), field };
         // What is wrong by too much is of no use, unless all that there is time for is.
         let useless = if wish.time_ms.is_none() { wish.error } else { f64::INFINITY };
         let mut found = pilot::run_all(asked, &possible, useless).await?;
-        let calibration = self.calibrations.of(self).await?;
-        let samples = body.pointer("/budget/samples").and_then(Value::as_u64).map_or(u32::MAX, |n| n as u32);
-        let most = self.limits.max_samples.min(samples);
-        let choose =
-            |found: &Found| choose::choose(&found.pilots, &found.places, wish, asked.image, &calibration, most);
-        let mut chosen = choose(&found);
-        for _ in 0..LOOKS {
-            let looked = (chosen.enough && found.deepen(asked, chosen.index, chosen.samples).await?)
-                || ((chosen.enough || wish.time_ms.is_some()) && found.confirm(asked, chosen.index).await?);
-            if !looked && !std::mem::take(&mut found.places.hopeful) {
-                break;
-            }
-            chosen = choose(&found);
-        }
-        found.places.hopeful = false;
-        chosen = choose(&found);
+        let photons = match &seen.simulated {
+            Some(simulated) => Some(simulated.photons(asked, &seen.reference, seen.features.pixels_per_voxel).await?),
+            None => None,
+        };
+        let chosen = self.choose(asked, &mut found, wish, photons.as_ref()).await?;
         considered.splice(0..0, chosen.considered.into_iter().chain(found.skipped));
         let best = &found.pilots[chosen.index];
         let mut request = best.candidate.request(body);
-        request["budget"] = budget(best, chosen.samples, chosen.enough, wish);
-        let mut reasons = features.words();
+        request["budget"] = budget(best, chosen.amount.samples, chosen.enough && photons.is_none(), wish);
+        if let Some((simulated, photons)) = seen.simulated.as_ref().zip(chosen.amount.photons) {
+            simulated.with_photons(&mut request, photons);
+        }
+        let mut reasons = seen.features.words();
         reasons.extend(chosen.reasons);
         Ok(Plan {
             technique: best.candidate.technique.clone(),
             options: best.candidate.own.clone(),
-            samples: chosen.samples,
+            samples: chosen.amount.samples,
+            photons: chosen.amount.photons,
             device_ms: chosen.device_ms,
             error: chosen.error,
             reasons,
             considered,
-            features,
+            features: seen.features,
             request,
         })
+    }
+
+    /// Chooses, and looks closer where that might change what is chosen, until it does not.
+    async fn choose(
+        &self,
+        asked: Asked<'_>,
+        found: &mut Found,
+        wish: Wish,
+        photons: Option<&Photons>,
+    ) -> Result<Chosen> {
+        let calibration = self.calibrations.of(self).await?;
+        let samples = asked.body.pointer("/budget/samples").and_then(Value::as_u64).map_or(u32::MAX, |n| n as u32);
+        let most = self.limits.max_samples.min(samples);
+        let choose = |found: &Found| {
+            let (Found { pilots, places, .. }, image, calibration) = (found, asked.image, &calibration);
+            Choice { pilots, places, wish, image, calibration, most, photons }.choose()
+        };
+        let mut chosen = choose(found);
+        for _ in 0..LOOKS {
+            let looked = (chosen.enough && found.deepen(asked, chosen.index, chosen.amount.samples).await?)
+                || ((chosen.enough || wish.time_ms.is_some()) && found.confirm(asked, chosen.index).await?);
+            if !looked && !std::mem::take(&mut found.places.hopeful) {
+                break;
+            }
+            chosen = choose(found);
+        }
+        found.places.hopeful = false;
+        Ok(choose(found))
+    }
+
+    /// What a request looks at, as the planner sees it: of a field that is yet to be computed a simulation of few photons.
+    async fn see(&self, body: &Value, family: Family) -> Result<Seen> {
+        let scene = self.reference(body, family)?;
+        let reference = settings::reference(body, family);
+        let simulated = match scene.subject() {
+            Subject::Volume(_) => None,
+            Subject::Field(_) => Some(Simulated::of(self, body, &reference).await?),
+        };
+        let volume = match (scene.subject(), &simulated) {
+            (_, Some(simulated)) => simulated.volume(),
+            (Subject::Volume(volume), _) => volume,
+            (Subject::Field(_), None) => return Err(Error::internal("a field that was not simulated")),
+        };
+        let features = Features::of(&scene, volume, &reference.request(body));
+        Ok(Seen { scene, reference, simulated, features })
     }
 
     /// Measures what is to be known of this device, unless that is known.
@@ -180,11 +174,9 @@ impl Planner<'_> {
     ///
     /// # Errors
     /// Those of the request.
-    pub fn settings(&self, body: &Value) -> Result<Vec<(String, Value)>> {
+    pub async fn settings(&self, body: &Value) -> Result<Vec<(String, Value)>> {
         let family = Family::of(body);
-        let scene = self.reference(body, family)?;
-        let Subject::Volume(volume) = scene.subject() else { return Ok(Vec::new()) };
-        let features = Features::of(&scene, volume, &settings::reference(body, family).request(body));
+        let features = self.see(body, family).await?.features;
         let (candidates, _) = settings::candidates(body, family, &features, f64::INFINITY);
         let requests = candidates.into_iter().map(|c| (c.words.clone(), c.request(body)));
         Ok(requests.filter(|(_, request)| self.scene(request).is_ok()).collect())

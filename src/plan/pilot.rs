@@ -15,7 +15,7 @@ pub const PIXELS: f64 = 4096.0;
 /// Samples of a pilot.
 pub const SAMPLES: u32 = 16;
 /// Deviations that one in twenty is beyond, on one side.
-const ONE_IN_TWENTY: f64 = 1.645;
+pub const ONE_IN_TWENTY: f64 = 1.645;
 /// Groups of pixels of which the spread tells how well a bias is known.
 const GROUPS: usize = 16;
 
@@ -38,6 +38,37 @@ pub struct Pilot {
     pub ms_per_sample: f64,
     /// Once the whole picture was begun: what it costs besides its samples and what a sample of it costs, ms.
     pub whole: Option<[f64; 2]>,
+}
+
+impl Pilot {
+    /// The square of the noise after `samples`, with as much of the random part as `by_chance`.
+    pub fn squared_after(&self, samples: f64, places: &Places, by_chance: f64) -> f64 {
+        places.squared_after(samples) + by_chance * by_chance * self.random / samples
+    }
+
+    /// The whole error after `samples`.
+    pub fn error_after(&self, samples: f64, places: &Places) -> f64 {
+        (self.squared_after(samples, places, 1.0) + self.bias * self.bias).sqrt()
+    }
+
+    /// The fewest samples after which the error is at most `error`; none where the bias is in the way.
+    pub fn samples_for(&self, error: f64, places: &Places, most: u32) -> Option<u32> {
+        let room = error * error - (self.bias + self.bias_within).powi(2);
+        let enough = |n: u32| self.squared_after(f64::from(n), places, self.chance) <= room;
+        // What was looked at need not fall everywhere; beyond it, it does.
+        let last = places.last().min(most);
+        let looked_at = (1..=last).find(|n| room > 0.0 && enough(*n));
+        looked_at.or_else(|| {
+            (room > 0.0 && enough(most)).then(|| {
+                let (mut low, mut high) = (last, most);
+                while high - low > 1 {
+                    let middle = low + (high - low) / 2;
+                    if enough(middle) { high = middle } else { low = middle }
+                }
+                high
+            })
+        })
+    }
 }
 
 /// The relative deviation of a mean of squares over so many pixels.

@@ -9,7 +9,9 @@ use super::candidates::Candidate;
 use crate::error::{Error, Result};
 use crate::film::{Film, Round};
 use crate::job::{Engine, Job, State};
+use crate::scene::Scene;
 use crate::scene::region::Region;
+use crate::volume::Volume;
 
 /// A finished pilot render.
 pub struct Run {
@@ -59,6 +61,8 @@ pub struct Asked<'a> {
     pub body: &'a Value,
     /// The picture's sides.
     pub image: [u32; 2],
+    /// What is looked at in place of a field that is yet to be computed.
+    pub field: Option<&'a Arc<Volume>>,
 }
 
 impl Asked<'_> {
@@ -70,7 +74,7 @@ impl Asked<'_> {
         let mut request = candidate.request(self.body);
         request["budget"] = json!({"samples": samples.min(self.planner.limits.max_samples)});
         request["seed"] = json!(seed);
-        finish(self.planner, request, region).await
+        finish(self.planner, request, region, self.field).await
     }
 
     /// Runs it with two seeds.
@@ -82,24 +86,42 @@ impl Asked<'_> {
     }
 }
 
-/// Runs a region of a request's picture to its end, unseen.
+/// Runs a region of a request's picture to its end, unseen; of a field as it is there.
 ///
 /// # Errors
 /// Those of the request.
-pub async fn finish(planner: &Planner<'_>, request: Value, region: Region) -> Result<Run> {
+pub async fn finish(
+    planner: &Planner<'_>,
+    request: Value,
+    region: Region,
+    field: Option<&Arc<Volume>>,
+) -> Result<Run> {
     let scene = planner.scene(&request)?.into_pilot(region);
-    let job = CancelOnDrop { engine: planner.engine, job: planner.engine.submit_pilot(request, scene) };
-    let job = &job.job;
-    let ended = job.watch().wait_for(|u| u.state.is_terminal()).await.map(drop).map_err(Error::internal);
-    let (state, film) = (job.state(), job.film());
-    ended?;
-    let failed = || Error::internal(format!("a pilot failed: {}", job.resource()["failure"]));
-    let (State::Done, Some((film, _))) = (state, film) else { return Err(failed()) };
+    let scene = match field {
+        Some(field) => scene.looking_at(field.clone()),
+        None => scene,
+    };
+    let job = to_its_end(planner, request, scene).await?;
+    let failed = || Error::internal("a pilot without a film");
+    let (film, _) = job.film().ok_or_else(failed)?;
     let rounds = &film.rounds;
     let (Some(first), Some(last)) = (rounds.first(), rounds.last()) else { return Err(failed()) };
     let more = f64::from(last.samples - first.samples);
     let sample = if more > 0.0 { (last.device_ms - first.device_ms) / more } else { first.device_ms };
     Ok(Run { pixels: film.main.pixels(), ms: [(first.device_ms - sample).max(0.0), sample], film })
+}
+
+/// Runs a scene to its end, unseen; where that is not waited for any more, it is cancelled.
+///
+/// # Errors
+/// [`Error::Internal`] where it fails.
+pub async fn to_its_end(planner: &Planner<'_>, request: Value, scene: Scene) -> Result<Arc<Job>> {
+    let job = CancelOnDrop { engine: planner.engine, job: planner.engine.submit_pilot(request, scene) };
+    job.job.watch().wait_for(|u| u.state.is_terminal()).await.map(drop).map_err(Error::internal)?;
+    match job.job.state() {
+        State::Done => Ok(job.job.clone()),
+        _ => Err(Error::internal(format!("a pilot failed: {}", job.job.resource()["failure"]))),
+    }
 }
 
 /// 0 of nothing.

@@ -188,6 +188,11 @@ impl Scene {
         Self { pilot: Some(region), ..self }
     }
 
+    /// With a volume that is there in place of what is looked at.
+    pub(crate) fn looking_at(self, volume: Arc<Volume>) -> Self {
+        Self { subject: Subject::Volume(volume), ..self }
+    }
+
     /// Whether it has only some of its pixels, for a planner.
     pub(crate) fn is_pilot(&self) -> bool {
         self.pilot.is_some()

@@ -131,7 +131,7 @@ impl Bench {
     /// # Errors
     /// Those of the request.
     pub fn settings(&self, request: &Value) -> Result<Vec<(String, Value)>> {
-        self.planner().settings(request)
+        self.handle.block_on(self.planner().settings(request))
     }
 
     /// Runs a request and reads from it.

@@ -1,0 +1,198 @@
+//! How many photons a picture needs of a field that is yet to be computed.
+//!
+//! What a picture I_N of N photons is wrong by is random in them, e² = F² / N. Fields with seeds of their own, some of N and one of 4 N
+//! photons, tell F²: |I_N − I_4N|² = F² (1/N + 1/4N). Where the picture is not linear in the field, as where its colours follow the field's
+//! range, it is wrong by more, and by what falls faster: that is in it too. The view's own random part is not: the square is the mean over
+//! the pixels of d d′, of two seeds of the view. Often it is of a few bright pixels, as those of a beam, so one field would tell little.
+
+use std::sync::Arc;
+
+use serde_json::{Value, json};
+
+use super::Planner;
+use super::candidates::Candidate;
+use super::noise::in_common;
+use super::pilot::{ONE_IN_TWENTY, PIXELS, SAMPLES, deviation};
+use super::run::{Asked, Run, mean, to_its_end};
+use crate::error::{Error, Result};
+use crate::scene::region::Region;
+use crate::technique;
+use crate::volume::Volume;
+
+/// Photons of the first simulation, which tells how fast they are, and how long the second is to take, ms.
+const FIRST: u64 = 20_000;
+const PILOT_MS: f64 = 100.0;
+/// How many of such fields there are, and how many times as many photons the last has.
+const FIELDS: usize = 4;
+const MANY: u64 = 4;
+/// Pictures that are made while the field fills, besides the last.
+const ON_THE_WAY: f64 = 5.0;
+/// Digits of a planned number of photons are kept but for this part of it.
+const ROUNDED: f64 = 0.01;
+
+/// A field as pilots see it.
+pub struct Simulated {
+    technique: &'static str,
+    /// Of few photons, each with a seed of its own, and of many.
+    few: Vec<Arc<Volume>>,
+    many: Arc<Volume>,
+    photons: [u64; 2],
+    /// What the device takes besides the photons, and for one of them.
+    ms: [f64; 2],
+    given: Option<u64>,
+    most: u64,
+}
+
+/// What is known of a field's photons.
+#[derive(Debug, Clone, Copy)]
+pub struct Photons {
+    /// F², relative to the picture's mean, squared.
+    pub squared: f64,
+    /// How much more than F² / N says a picture may be wrong by chance.
+    pub chance: f64,
+    /// Device time besides them, and of one, ms.
+    pub ms: [f64; 2],
+    /// How many are asked for, where that is said.
+    pub given: Option<u64>,
+    /// How many are permitted.
+    pub most: u64,
+}
+
+impl Simulated {
+    /// The field technique and the parameters of a request, if it looks at a field.
+    fn asked(body: &Value) -> Option<(&'static str, &Value)> {
+        let volume = body.get("volume")?;
+        technique::fields().find_map(|t| Some((t.name, volume.get(t.name)?)))
+    }
+
+    /// Simulates few photons and four times as many.
+    ///
+    /// # Errors
+    /// Those of the request.
+    pub async fn of(planner: &Planner<'_>, body: &Value, reference: &Candidate) -> Result<Self> {
+        let (technique, own) = Self::asked(body).ok_or_else(|| Error::internal("a field of no technique"))?;
+        let given = own.get("photons").and_then(Value::as_u64);
+        let most = planner.limits.max_photons;
+        let simulate = async |photons: u64, seed: u64| -> Result<(Arc<Volume>, f64)> {
+            let mut request = reference.request(body);
+            let of = &mut request["volume"][technique];
+            let own_seed = of["seed"].as_u64().unwrap_or(0);
+            (of["photons"], of["seed"]) = (json!(photons), json!(own_seed ^ seed));
+            request["budget"] = json!({"samples": 1});
+            let scene = planner.scene(&request)?;
+            let region = Region::some(1.0, [0, 0], scene.image());
+            let job = to_its_end(planner, request, scene.into_pilot(region)).await?;
+            let speed = job.resource().pointer("/result/photons_per_ms").and_then(Value::as_f64).unwrap_or(0.0);
+            let field = job.field().ok_or_else(|| Error::internal("a pilot without its field"))?;
+            Ok((field, photons as f64 / speed.max(f64::MIN_POSITIVE)))
+        };
+        let first = FIRST.min(most);
+        let (_, ms) = simulate(first, 1).await?;
+        let few = ((PILOT_MS * first as f64 / ms) as u64).clamp(first, (most / MANY).max(first));
+        let many = (MANY * few).min(most);
+        let (mut fields, mut fewer_ms) = (Vec::new(), f64::INFINITY);
+        for seed in 0..FIELDS as u64 {
+            let (field, ms) = simulate(few, 2 + seed).await?;
+            fields.push(field);
+            fewer_ms = fewer_ms.min(ms);
+        }
+        let (field, more_ms) = simulate(many, 2 + FIELDS as u64).await?;
+        let (per, more) = (more_ms / many as f64, (many - few).max(1) as f64);
+        // Where few of them take as long as many, that is not their own time.
+        let one = ((more_ms - fewer_ms) / more).clamp(0.5 * per, per);
+        let ms = [more_ms - one * many as f64, one];
+        Ok(Self { technique, few: fields, many: field, photons: [few, many], ms, given, most })
+    }
+
+    /// What pilots look at.
+    pub fn volume(&self) -> &Arc<Volume> {
+        &self.many
+    }
+
+    /// What the photons do to the picture, as the reference shows it.
+    ///
+    /// # Errors
+    /// Those of the request.
+    pub async fn photons(
+        &self,
+        asked: Asked<'_>,
+        reference: &Candidate,
+        pixels_per_voxel: f64,
+    ) -> Result<Photons> {
+        let region = Region::some(PIXELS, [0, 0], asked.image);
+        let look = async |field: &Arc<Volume>| -> Result<[Run; 2]> {
+            Asked { field: Some(field), ..asked }.run_two(reference, region, SAMPLES).await
+        };
+        let last = |run: &Run| run.rounds().last().cloned().ok_or_else(|| Error::internal("a pilot without rounds"));
+        let all = look(&self.many).await?;
+        let [a, b] = [last(&all[0])?, last(&all[1])?];
+        let mut apart = vec![0.0; all[0].pixels];
+        for field in &self.few {
+            let few = look(field).await?;
+            let [c, d] = [last(&few[0])?, last(&few[1])?];
+            let products = in_common([&c, &a], [&d, &b]);
+            apart.iter_mut().zip(products).for_each(|(sum, p)| *sum += p / FIELDS as f64);
+        }
+        let scale = all[0].mean();
+        let per_photon = 1.0 / self.photons[0] as f64 + 1.0 / self.photons[1] as f64;
+        let squared = mean(apart.iter().copied()).max(0.0) / (scale * scale) / per_photon;
+        // Pixels of one voxel are one.
+        let alike = (pixels_per_voxel / f64::from(region.apart)).max(1.0).powi(2);
+        Ok(Photons {
+            squared,
+            chance: by_chance(independent(&apart) / alike),
+            ms: self.ms,
+            given: self.given,
+            most: self.most,
+        })
+    }
+
+    /// The request with so many of them.
+    pub fn with_photons(&self, request: &mut Value, photons: u64) {
+        request["volume"][self.technique]["photons"] = json!(photons);
+    }
+}
+
+impl Photons {
+    /// The square of what they bring after so many, with as much as may be by chance.
+    pub fn squared_after(&self, photons: u64, by_chance: f64) -> f64 {
+        by_chance * by_chance * self.squared / photons as f64
+    }
+
+    /// The fewest that are wrong by no more than `room`, squared; none where that is more than are permitted, or than are asked for.
+    pub fn needed(&self, room: f64) -> Option<u64> {
+        let least = (self.squared_after(1, self.chance) / room).max(1.0);
+        match self.given {
+            Some(given) => (room > 0.0 && least <= given as f64).then_some(given),
+            None => (room > 0.0 && least <= self.most as f64).then(|| rounded_up(least).min(self.most)),
+        }
+    }
+
+    /// How many there is time for.
+    pub fn in_time(&self, ms: f64) -> u64 {
+        self.given.unwrap_or((((ms - self.ms[0]) / self.ms[1]) as u64).clamp(1, self.most))
+    }
+
+    /// What they cost, with the pictures on the way.
+    pub fn cost(&self, photons: u64, picture_ms: f64) -> f64 {
+        self.ms[0] + self.ms[1] * photons as f64 + ON_THE_WAY * picture_ms
+    }
+}
+
+/// Of how many pixels a sum of squares is, (Σ s)² / Σ s², where the square of one that is known by so many fields is too large by 1 + 2/k.
+fn independent(squares: &[f64]) -> f64 {
+    let (sum, of_squares) = squares.iter().fold((0.0, 0.0), |(sum, of_squares), s| (sum + s, of_squares + s * s));
+    if of_squares > 0.0 { sum * sum / of_squares * (1.0 + 2.0 / FIELDS as f64) } else { 1.0 }
+}
+
+/// What a picture may be wrong by over what it is on average, in 19 of 20, as `pilot::chance`, but for pixels that may be few: the logarithm
+/// of such a ratio is the more normal.
+fn by_chance(pixels: f64) -> f64 {
+    (0.5 * ONE_IN_TWENTY * deviation(pixels).hypot(deviation(FIELDS as f64 * pixels))).exp()
+}
+
+/// With few digits, and no less.
+fn rounded_up(photons: f64) -> u64 {
+    let digit = 10f64.powf((ROUNDED * photons).log10().floor()).max(1.0);
+    ((photons / digit).ceil() * digit) as u64
+}

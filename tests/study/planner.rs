@@ -1,0 +1,131 @@
+//! Plans against truths: what is dropped, and what must not be.
+
+use cloudchamber::plan::{Considered, Plan};
+use cloudchamber::study::bench::{Bench, Reads};
+use serde_json::{Value, json};
+
+use super::on_a_bench;
+
+/// What a picture is wrong by, against the first setting with many samples, and photons where it is of a field.
+fn error_of(bench: &Bench, asked: &Value, request: &Value, samples: u64, photons: Option<u64>) -> f64 {
+    let (_, mut reference) = bench.settings(asked).unwrap().swap_remove(0);
+    // What is random in the truth is independent of the plan's: what two seeds of it differ by.
+    reference["budget"] = json!({"samples": samples / 2});
+    let [a, b] = [98, 99].map(|seed| {
+        reference["seed"] = json!(seed);
+        if let Some(photons) = photons {
+            let field = &mut reference["volume"]["photon_transport"];
+            (field["seed"], field["photons"]) = (json!(seed), json!(photons));
+        }
+        bench.run(&reference, Reads::Luminance).unwrap().values
+    });
+    let truth: Vec<f64> = a.iter().zip(&b).map(|(a, b)| 0.5 * (a + b)).collect();
+    let found = bench.run(request, Reads::Luminance).unwrap().values;
+    let mean = truth.iter().sum::<f64>() / truth.len() as f64;
+    let squares = found.iter().zip(&truth).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / truth.len() as f64;
+    let own = a.iter().zip(&truth).map(|(a, t)| (a - t).powi(2)).sum::<f64>() / truth.len() as f64;
+    ((squares - own) / mean.powi(2)).max(0.0).sqrt()
+}
+
+fn plan(bench: &Bench, request: &Value) -> Plan {
+    let plan = bench.plan(request).unwrap();
+    eprintln!("{}: {} samples, {}, of {}", plan.technique, plan.samples, plan.options, plan.request["volume"]);
+    plan
+}
+
+#[test]
+fn what_is_small_thin_or_sharp_is_not_dropped() {
+    on_a_bench(|bench| {
+        let image = json!({"width": 128, "height": 128});
+        let points = json!([{"value": 0, "color": [0.3, 0.3, 0.3], "opacity_per_unit": 0}, {"value": 1, "color": [1, 1, 1], "opacity_per_unit": 60}]);
+        let looked_at = |volume: &Value, error: f64| {
+            json!({"technique": "auto", "volume": volume, "image": image, "budget": {"max_error": error},
+                "camera": {"eye": [0.3, 0.4, 3], "up": [0, 1, 0], "fov_y_deg": 36}, "emission_absorption": {"transfer_function": {"points": points}}})
+        };
+        let bright = |p: [f64; 3]| if p.iter().all(|v| v.abs() < 0.03) { 1.0 } else { 0.004 };
+        let detail = bench.floats([48; 3], [2.0; 3], bright).unwrap();
+        let shell = |p: [f64; 3]| f64::from(u8::from((p.iter().map(|v| v * v).sum::<f64>().sqrt() - 0.7).abs() < 0.03));
+        let shell = bench.floats([48; 3], [2.0; 3], shell).unwrap();
+        let mut peak = looked_at(&json!({"builtin": "smoke", "resolution": 48}), 0.15);
+        peak.as_object_mut().unwrap().remove("emission_absorption");
+        peak["medium"] =
+            json!({"sigma_t_per_unit": 8, "albedo": 0.95, "phase": {"type": "henyey_greenstein", "g": 0.93}});
+        // The sun is behind the cloud: what comes through is the forward peak, scattered a few times.
+        peak["lights"] =
+            json!([{"type": "sun", "direction": [-0.3, -0.4, -3], "irradiance": 3}, {"type": "sky", "radiance": 0.05}]);
+        // A lamp of a few pixels, seen past the cloud: hardly one of them is a pilot's.
+        let mut lamp = looked_at(&json!({"builtin": "gaussian", "resolution": 32}), 0.05);
+        lamp.as_object_mut().unwrap().remove("emission_absorption");
+        lamp["medium"] = json!({"sigma_t_per_unit": 1, "albedo": 0.5});
+        lamp["lights"] = json!([{"type": "sphere", "position": [0.73, 0.8, -0.3], "radius": 0.03, "radiance": 60}, {"type": "sky", "radiance": 0.2}]);
+        for (name, request, samples) in [
+            ("detail", looked_at(&detail, 0.02), 256),
+            ("shell", looked_at(&shell, 0.03), 256),
+            ("peak", peak, 1500),
+            ("lamp", lamp, 1500),
+        ] {
+            let asked = request["budget"]["max_error"].as_f64().unwrap();
+            let error = error_of(bench, &request, &plan(bench, &request).request, samples, None);
+            assert!(error <= asked, "{name}: {error} for {asked}");
+        }
+    });
+}
+
+#[test]
+fn voxels_finer_than_the_pixels_are_averaged_where_that_is_enough() {
+    on_a_bench(|bench| {
+        let looked_at = |volume: &Value, error: f64| {
+            json!({"technique": "auto", "volume": volume, "image": {"width": 64, "height": 48}, "budget": {"max_error": error},
+                "camera": {"eye": [0.4, 0.5, 3.2], "up": [0, 1, 0], "fov_y_deg": 40}, "emission_absorption": {}})
+        };
+        // Smooth: seen from so far half of its voxels a side do.
+        let smooth = looked_at(&json!({"builtin": "marschner_lobb", "resolution": 192}), 0.03);
+        let found = plan(bench, &smooth);
+        assert!(found.request["volume"]["level"].as_u64() > Some(0), "{}", found.request["volume"]);
+        let error = error_of(bench, &smooth, &found.request, 128, None);
+        assert!(error <= 0.03, "{error}");
+        let level = |c: &&Considered| c.words.contains("of level 1");
+        assert!(found.considered.iter().any(|c| level(&c) && c.bias > Some(0.0)), "its bias is measured");
+
+        // A shell of one voxel, opaque: what is left of it in a mean is another picture.
+        let shell = |p: [f64; 3]| f64::from(u8::from((p.iter().map(|v| v * v).sum::<f64>().sqrt() - 0.7).abs() < 0.006));
+        let mut thin = looked_at(&bench.floats([176; 3], [2.0; 3], shell).unwrap(), 0.05);
+        thin["emission_absorption"]["transfer_function"] = json!({"points": [
+            {"value": 0.45, "color": [0.3, 0.3, 0.3], "opacity_per_unit": 0}, {"value": 0.55, "color": [1, 1, 1], "opacity_per_unit": 300}]});
+        let found = plan(bench, &thin);
+        assert_eq!(found.request["volume"].get("level"), None, "{}", found.request["volume"]);
+        let error = error_of(bench, &thin, &found.request, 128, None);
+        assert!(error <= 0.05, "{error}");
+    });
+}
+
+#[test]
+fn a_field_gets_the_photons_that_its_picture_needs_and_no_more() {
+    on_a_bench(|bench| {
+        let cube = json!({"medium": {"mu_a_per_mm": 0.005, "mu_s_per_mm": 1, "index": 1.37}, "grid": [30, 30, 30]});
+        let smoke = json!({"density": {"builtin": "smoke", "resolution": 32}, "medium": {"mu_a_per_mm": 1, "mu_s_per_mm": 4},
+            "source": {"type": "planar"}, "tally": "absorbed"});
+        for (name, field, view, error) in [
+            ("cube", &cube, json!({"projection": {"mode": "mean"}}), 0.05),
+            ("chamber", &json!({"grid": [32, 32, 32]}), json!({"emission_absorption": {}}), 0.08),
+            ("smoke", &smoke, json!({"emission_absorption": {}}), 0.06),
+        ] {
+            let mut request = json!({"technique": "auto", "volume": {"photon_transport": field},
+                "image": {"width": 96, "height": 72}, "budget": {"max_error": error}});
+            request.as_object_mut().unwrap().extend(view.as_object().unwrap().clone());
+            let found = plan(bench, &request);
+            let photons = found.photons.unwrap();
+            assert_eq!(found.request["volume"]["photon_transport"]["photons"], photons, "{name}");
+            let error_with = |photons_planned: u64| {
+                let mut planned = found.request.clone();
+                planned["volume"]["photon_transport"]["photons"] = json!(photons_planned);
+                error_of(bench, &request, &planned, 128, Some(12 * photons))
+            };
+            let (enough, fewer) = (error_with(photons), error_with(photons / 4));
+            eprintln!("{name}: {photons} photons, {enough} for {error}, {fewer} with a fourth of them");
+            assert!(enough <= error && fewer > error, "{name}: {enough}, and {fewer} with a fourth of {photons}");
+            request["volume"]["photon_transport"]["photons"] = json!(5000);
+            assert_eq!(plan(bench, &request).photons, Some(5000), "{name}: what is said is kept");
+        }
+    });
+}
