@@ -287,7 +287,8 @@ impl Live {
         let Some(view) = &self.view else { return Ok(()) };
         let background = self.scene.as_ref().map_or(Background::default(), Scene::background);
         let film = Film { field_error: self.field_error, background, ..view.film(context)? };
-        let device_time = self.earlier_time + view.device_time + self.field.as_ref().map_or(Duration::ZERO, |f| f.device_time);
+        let device_time =
+            self.earlier_time + view.device_time + self.field.as_ref().map_or(Duration::ZERO, |f| f.device_time);
         let snapshot = Snapshot {
             film: Arc::new(film),
             generation: self.generation,

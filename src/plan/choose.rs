@@ -1,7 +1,7 @@
 //! The cheapest candidate that is enough, or the best that is in time.
 
 use super::calibration::Calibration;
-use super::noise::Places;
+use super::noise::{Places, SMALL};
 use super::photons::Photons;
 use super::pilot::Pilot;
 use super::{Considered, Predicted, Wish};
@@ -122,6 +122,16 @@ impl Choice<'_> {
         parts().map(split).min_by(|a, b| self.error(p, *a).total_cmp(&self.error(p, *b)))
     }
 
+    /// As near as a setting comes: beside a field's error a view's need not be any smaller.
+    fn nearest(&self, p: &Pilot) -> Amount {
+        let Some(photons) = self.photons else { return Amount { samples: self.most, photons: None } };
+        let n = photons.given.unwrap_or(photons.most);
+        let room = SMALL * photons.squared_after(n, 1.0);
+        let enough = |samples: &u32| p.squared_after(f64::from(*samples), self.places, 1.0) <= room;
+        let samples = (0..31).map(|power| 1 << power).take_while(|n| *n < self.most).find(enough);
+        Amount { samples: samples.unwrap_or(self.most), photons: Some(n) }
+    }
+
     /// What is enough, and in time.
     fn enough(&self, p: &Pilot) -> Option<Amount> {
         let in_time = |amount: &Amount| self.wish.time_ms.is_none_or(|t| self.cost(p, *amount) <= t);
@@ -134,15 +144,13 @@ impl Choice<'_> {
         let by_cost = |i: &usize| self.enough(&pilots[*i]).map_or(f64::INFINITY, |n| self.cost(&pilots[*i], n));
         let by_error = |i: &usize| {
             let p = &pilots[*i];
-            self.in_time(p).map_or(p.bias, |n| self.error(p, n) + p.bias_within)
+            self.error(p, self.in_time(p).unwrap_or_else(|| self.nearest(p))) + p.bias_within
         };
         let all = || 0..pilots.len();
-        let enough =
-            all().filter(|i| by_cost(i).is_finite()).min_by(|a, b| by_cost(a).total_cmp(&by_cost(b)));
+        let enough = all().filter(|i| by_cost(i).is_finite()).min_by(|a, b| by_cost(a).total_cmp(&by_cost(b)));
         let index = enough.or_else(|| all().min_by(|a, b| by_error(a).total_cmp(&by_error(b)))).unwrap_or(0);
         let best = &pilots[index];
-        let most = Amount { samples: self.most, photons: self.photons.map(|p| p.given.unwrap_or(p.most)) };
-        let amount = self.enough(best).or_else(|| self.in_time(best)).unwrap_or(most);
+        let amount = self.enough(best).or_else(|| self.in_time(best)).unwrap_or_else(|| self.nearest(best));
         let (time, error) = (self.cost(best, amount), self.error(best, amount));
         let considered = pilots.iter().map(|p| {
             let amount = if wish.says_error { self.for_error(p) } else { self.in_time(p) };
@@ -169,7 +177,9 @@ impl Choice<'_> {
         let why = match needed {
             Some((n, ms)) if late(ms).is_some() => format!("{n} would bring it there, but in about {ms:.0} ms"),
             Some((n, _)) => format!("{n} bring it to {}", percent(self.error(p, n))),
-            None if bias >= AIM * wish.error => format!("wrong by up to {} however many samples it takes", percent(bias)),
+            None if bias >= AIM * wish.error => {
+                format!("wrong by up to {} however many samples it takes", percent(bias))
+            }
             None if self.photons.is_some() => "more photons or samples than are permitted would be needed".into(),
             None => "more samples than are permitted would be needed".into(),
         };

@@ -1,18 +1,20 @@
 //! How many photons a picture needs of a field that is yet to be computed.
 //!
-//! What a picture I_N of N photons is wrong by is random in them, e² = F² / N. Fields with seeds of their own, some of N and one of 4 N
-//! photons, tell F²: |I_N − I_4N|² = F² (1/N + 1/4N). Where the picture is not linear in the field, as where its colours follow the field's
+//! What a picture I_N of N photons is wrong by is random in them, e² = F² / N. Fields with seeds of their own, some of N and one of 8 N
+//! photons, tell F²: |I_N − I_8N|² = F² (1/N + 1/8N). Where the picture is not linear in the field, as where its colours follow the field's
 //! range, it is wrong by more, and by what falls faster: that is in it too. The view's own random part is not: the square is the mean over
-//! the pixels of d d′, of two seeds of the view. Often it is of a few bright pixels, as those of a beam, so one field would tell little.
+//! the pixels of d d′, of two seeds of the view. Often it is of a few bright pixels, as those of a beam, or of one number
+//! that all colours follow: one field would tell little.
 
 use std::sync::Arc;
 
 use serde_json::{Value, json};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::Planner;
 use super::candidates::Candidate;
 use super::noise::in_common;
-use super::pilot::{ONE_IN_TWENTY, PIXELS, SAMPLES, deviation};
+use super::pilot::{PIXELS, SAMPLES};
 use super::run::{Asked, Run, mean, to_its_end};
 use crate::error::{Error, Result};
 use crate::scene::region::Region;
@@ -21,14 +23,16 @@ use crate::volume::Volume;
 
 /// Photons of the first simulation, which tells how fast they are, and how long the second is to take, ms.
 const FIRST: u64 = 20_000;
-const PILOT_MS: f64 = 100.0;
+const PILOT_MS: f64 = 60.0;
 /// How many of such fields there are, and how many times as many photons the last has.
-const FIELDS: usize = 4;
-const MANY: u64 = 4;
+const FIELDS: usize = 8;
+const MANY: u64 = 8;
 /// Pictures that are made while the field fills, besides the last.
 const ON_THE_WAY: f64 = 5.0;
 /// Digits of a planned number of photons are kept but for this part of it.
 const ROUNDED: f64 = 0.01;
+/// Of more pixels than these it does not matter how many there are.
+const MOST_FREEDOM: f64 = 1e4;
 
 /// A field as pilots see it.
 pub struct Simulated {
@@ -113,12 +117,7 @@ impl Simulated {
     ///
     /// # Errors
     /// Those of the request.
-    pub async fn photons(
-        &self,
-        asked: Asked<'_>,
-        reference: &Candidate,
-        pixels_per_voxel: f64,
-    ) -> Result<Photons> {
+    pub async fn photons(&self, asked: Asked<'_>, reference: &Candidate, pixels_per_voxel: f64) -> Result<Photons> {
         let region = Region::some(PIXELS, [0, 0], asked.image);
         let look = async |field: &Arc<Volume>| -> Result<[Run; 2]> {
             Asked { field: Some(field), ..asked }.run_two(reference, region, SAMPLES).await
@@ -126,11 +125,12 @@ impl Simulated {
         let last = |run: &Run| run.rounds().last().cloned().ok_or_else(|| Error::internal("a pilot without rounds"));
         let all = look(&self.many).await?;
         let [a, b] = [last(&all[0])?, last(&all[1])?];
-        let mut apart = vec![0.0; all[0].pixels];
+        let (mut apart, mut of_fields) = (vec![0.0; all[0].pixels], Vec::new());
         for field in &self.few {
             let few = look(field).await?;
             let [c, d] = [last(&few[0])?, last(&few[1])?];
-            let products = in_common([&c, &a], [&d, &b]);
+            let products: Vec<f64> = in_common([&c, &a], [&d, &b]).collect();
+            of_fields.push(mean(products.iter().copied()));
             apart.iter_mut().zip(products).for_each(|(sum, p)| *sum += p / FIELDS as f64);
         }
         let scale = all[0].mean();
@@ -140,7 +140,7 @@ impl Simulated {
         let alike = (pixels_per_voxel / f64::from(region.apart)).max(1.0).powi(2);
         Ok(Photons {
             squared,
-            chance: by_chance(independent(&apart) / alike),
+            chance: by_chance((independent(&apart) / alike).min(freedom(&of_fields))),
             ms: self.ms,
             given: self.given,
             most: self.most,
@@ -185,14 +185,49 @@ fn independent(squares: &[f64]) -> f64 {
     if of_squares > 0.0 { sum * sum / of_squares * (1.0 + 2.0 / FIELDS as f64) } else { 1.0 }
 }
 
-/// What a picture may be wrong by over what it is on average, in 19 of 20, as `pilot::chance`, but for pixels that may be few: the logarithm
-/// of such a ratio is the more normal.
-fn by_chance(pixels: f64) -> f64 {
-    (0.5 * ONE_IN_TWENTY * deviation(pixels).hypot(deviation(FIELDS as f64 * pixels))).exp()
+/// How free sums of squares are that vary so from one to the next: ν = 2 m² / s².
+fn freedom(sums: &[f64]) -> f64 {
+    let m = mean(sums.iter().copied());
+    let variance = sums.iter().map(|s| (s - m).powi(2)).sum::<f64>() / (sums.len() - 1) as f64;
+    2.0 * m * m / variance
+}
+
+/// What a picture may be wrong by over what pictures of all fields are, in 19 of 20: the square is a ratio of sums of ν squares and of
+/// k ν, and that has Fisher's distribution.
+fn by_chance(freedom: f64) -> f64 {
+    let freedom = if freedom.is_finite() { freedom.clamp(1.0, MOST_FREEDOM) } else { MOST_FREEDOM };
+    let ratio = FisherSnedecor::new(freedom, FIELDS as f64 * freedom);
+    ratio.map_or(1.0, |ratio| ratio.inverse_cdf(0.95)).sqrt()
 }
 
 /// With few digits, and no less.
 fn rounded_up(photons: f64) -> u64 {
     let digit = 10f64.powf((ROUNDED * photons).log10().floor()).max(1.0);
     ((photons / digit).ceil() * digit) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chance_is_that_of_tables() {
+        // F of 1 and 8 degrees of freedom at 0.95 is 5.318, of 4 and 32 it is 2.668.
+        assert!((by_chance(1.0).powi(2) - 5.318).abs() < 1e-3, "{}", by_chance(1.0).powi(2));
+        assert!((by_chance(4.0).powi(2) - 2.668).abs() < 1e-3, "{}", by_chance(4.0).powi(2));
+        assert!(by_chance(1e9) < 1.02 && by_chance(f64::NAN) < 1.02 && by_chance(0.0) == by_chance(1.0));
+        assert!((freedom(&[1.0, 3.0, 1.0, 3.0]) - 2.0 * 4.0 / (4.0 / 3.0)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn photons_are_as_many_as_the_room_asks_for() {
+        let photons = Photons { squared: 1000.0, chance: 1.2, ms: [5.0, 1e-3], given: None, most: 1_000_000 };
+        // 1.44 × 1000 / 0.01 = 144000.
+        assert_eq!(photons.needed(0.01), Some(144_000));
+        assert_eq!((photons.needed(1e-4), photons.needed(0.0), photons.needed(-1.0)), (None, None, None));
+        assert_eq!((rounded_up(123_456.0), rounded_up(99.2), rounded_up(3.0)), (124_000, 100, 3));
+        assert_eq!((photons.in_time(105.0), photons.in_time(-1.0)), (100_000, 1));
+        let given = Photons { given: Some(200_000), ..photons };
+        assert_eq!((given.needed(0.01), given.needed(0.001)), (Some(200_000), None));
+    }
 }

@@ -15,7 +15,7 @@ pub const PIXELS: f64 = 4096.0;
 /// Samples of a pilot.
 pub const SAMPLES: u32 = 16;
 /// Deviations that one in twenty is beyond, on one side.
-pub const ONE_IN_TWENTY: f64 = 1.645;
+const ONE_IN_TWENTY: f64 = 1.645;
 /// Groups of pixels of which the spread tells how well a bias is known.
 const GROUPS: usize = 16;
 

@@ -90,12 +90,7 @@ impl Asked<'_> {
 ///
 /// # Errors
 /// Those of the request.
-pub async fn finish(
-    planner: &Planner<'_>,
-    request: Value,
-    region: Region,
-    field: Option<&Arc<Volume>>,
-) -> Result<Run> {
+pub async fn finish(planner: &Planner<'_>, request: Value, region: Region, field: Option<&Arc<Volume>>) -> Result<Run> {
     let scene = planner.scene(&request)?.into_pilot(region);
     let scene = match field {
         Some(field) => scene.looking_at(field.clone()),

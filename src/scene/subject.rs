@@ -24,7 +24,11 @@ pub enum Subject {
 ///
 /// # Errors
 /// [`Error::Invalid`] with a pointer under `/volume`.
-pub(super) fn of_request(request: Option<&VolumeRequest>, store: &Store, limits: &Limits) -> Result<(Subject, Framing)> {
+pub(super) fn of_request(
+    request: Option<&VolumeRequest>,
+    store: &Store,
+    limits: &Limits,
+) -> Result<(Subject, Framing)> {
     let Some(request) = request else { return Ok(at_level(&built_in("smoke", None, None, store)?, 0)) };
     let given = usize::from(request.id.is_some()) + usize::from(request.builtin.is_some()) + request.field.len();
     if given != 1 {

@@ -12,6 +12,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
 use crate::error::{Error, Result};
 
 /// What the interval of a bias promises.
@@ -67,7 +69,7 @@ pub fn measure(runs: &[Vec<f64>], truth: &[f64]) -> Result<Measured> {
         lasting += (mean * mean - own / r) / n;
     }
     let spread = own_means.iter().map(|m| (m - bias).powi(2)).sum::<f64>() / (r - 1.0).max(1.0);
-    let t = if several { distrs::StudentsT::ppf(0.5 + CONFIDENCE / 2.0, r - 1.0) } else { 0.0 };
+    let t = StudentsT::new(0.0, 1.0, (r - 1.0).max(1.0)).map_err(Error::internal)?.inverse_cdf(0.5 + CONFIDENCE / 2.0);
     Ok(Measured {
         rmse: (squared / n / r).sqrt(),
         bias,

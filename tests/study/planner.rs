@@ -6,25 +6,37 @@ use serde_json::{Value, json};
 
 use super::on_a_bench;
 
-/// What a picture is wrong by, against the first setting with many samples, and photons where it is of a field.
-fn error_of(bench: &Bench, asked: &Value, request: &Value, samples: u64, photons: Option<u64>) -> f64 {
-    let (_, mut reference) = bench.settings(asked).unwrap().swap_remove(0);
-    // What is random in the truth is independent of the plan's: what two seeds of it differ by.
-    reference["budget"] = json!({"samples": samples / 2});
-    let [a, b] = [98, 99].map(|seed| {
-        reference["seed"] = json!(seed);
-        if let Some(photons) = photons {
-            let field = &mut reference["volume"]["photon_transport"];
-            (field["seed"], field["photons"]) = (json!(seed), json!(photons));
-        }
-        bench.run(&reference, Reads::Luminance).unwrap().values
-    });
-    let truth: Vec<f64> = a.iter().zip(&b).map(|(a, b)| 0.5 * (a + b)).collect();
-    let found = bench.run(request, Reads::Luminance).unwrap().values;
-    let mean = truth.iter().sum::<f64>() / truth.len() as f64;
-    let squares = found.iter().zip(&truth).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / truth.len() as f64;
-    let own = a.iter().zip(&truth).map(|(a, t)| (a - t).powi(2)).sum::<f64>() / truth.len() as f64;
-    ((squares - own) / mean.powi(2)).max(0.0).sqrt()
+/// The first setting with many samples, and photons where it is of a field, and what is random in it.
+struct Truth {
+    values: Vec<f64>,
+    own_squared: f64,
+}
+
+impl Truth {
+    fn of(bench: &Bench, asked: &Value, samples: u64, photons: Option<u64>) -> Self {
+        let (_, mut reference) = bench.settings(asked).unwrap().swap_remove(0);
+        reference["budget"] = json!({"samples": samples / 2});
+        let [a, b] = [98, 99].map(|seed| {
+            reference["seed"] = json!(seed);
+            if let Some(photons) = photons {
+                let field = &mut reference["volume"]["photon_transport"];
+                (field["seed"], field["photons"]) = (json!(seed), json!(photons / 2));
+            }
+            bench.run(&reference, Reads::Luminance).unwrap().values
+        });
+        let values: Vec<f64> = a.iter().zip(&b).map(|(a, b)| 0.5 * (a + b)).collect();
+        // What is random in it is independent of the plan's: what two seeds of it differ by.
+        let own_squared = a.iter().zip(&values).map(|(a, t)| (a - t).powi(2)).sum::<f64>() / values.len() as f64;
+        Self { values, own_squared }
+    }
+
+    /// What a picture is wrong by, relative.
+    fn error(&self, bench: &Bench, request: &Value) -> f64 {
+        let found = bench.run(request, Reads::Luminance).unwrap().values;
+        let mean = self.values.iter().sum::<f64>() / found.len() as f64;
+        let squares = found.iter().zip(&self.values).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / found.len() as f64;
+        ((squares - self.own_squared) / mean.powi(2)).max(0.0).sqrt()
+    }
 }
 
 fn plan(bench: &Bench, request: &Value) -> Plan {
@@ -65,7 +77,7 @@ fn what_is_small_thin_or_sharp_is_not_dropped() {
             ("lamp", lamp, 1500),
         ] {
             let asked = request["budget"]["max_error"].as_f64().unwrap();
-            let error = error_of(bench, &request, &plan(bench, &request).request, samples, None);
+            let error = Truth::of(bench, &request, samples, None).error(bench, &plan(bench, &request).request);
             assert!(error <= asked, "{name}: {error} for {asked}");
         }
     });
@@ -82,19 +94,20 @@ fn voxels_finer_than_the_pixels_are_averaged_where_that_is_enough() {
         let smooth = looked_at(&json!({"builtin": "marschner_lobb", "resolution": 192}), 0.03);
         let found = plan(bench, &smooth);
         assert!(found.request["volume"]["level"].as_u64() > Some(0), "{}", found.request["volume"]);
-        let error = error_of(bench, &smooth, &found.request, 128, None);
+        let error = Truth::of(bench, &smooth, 128, None).error(bench, &found.request);
         assert!(error <= 0.03, "{error}");
         let level = |c: &&Considered| c.words.contains("of level 1");
         assert!(found.considered.iter().any(|c| level(&c) && c.bias > Some(0.0)), "its bias is measured");
 
         // A shell of one voxel, opaque: what is left of it in a mean is another picture.
-        let shell = |p: [f64; 3]| f64::from(u8::from((p.iter().map(|v| v * v).sum::<f64>().sqrt() - 0.7).abs() < 0.006));
+        let shell =
+            |p: [f64; 3]| f64::from(u8::from((p.iter().map(|v| v * v).sum::<f64>().sqrt() - 0.7).abs() < 0.006));
         let mut thin = looked_at(&bench.floats([176; 3], [2.0; 3], shell).unwrap(), 0.05);
         thin["emission_absorption"]["transfer_function"] = json!({"points": [
             {"value": 0.45, "color": [0.3, 0.3, 0.3], "opacity_per_unit": 0}, {"value": 0.55, "color": [1, 1, 1], "opacity_per_unit": 300}]});
         let found = plan(bench, &thin);
         assert_eq!(found.request["volume"].get("level"), None, "{}", found.request["volume"]);
-        let error = error_of(bench, &thin, &found.request, 128, None);
+        let error = Truth::of(bench, &thin, 128, None).error(bench, &found.request);
         assert!(error <= 0.05, "{error}");
     });
 }
@@ -108,7 +121,7 @@ fn a_field_gets_the_photons_that_its_picture_needs_and_no_more() {
         for (name, field, view, error) in [
             ("cube", &cube, json!({"projection": {"mode": "mean"}}), 0.05),
             ("chamber", &json!({"grid": [32, 32, 32]}), json!({"emission_absorption": {}}), 0.08),
-            ("smoke", &smoke, json!({"emission_absorption": {}}), 0.06),
+            ("smoke", &smoke, json!({"emission_absorption": {}}), 0.12),
         ] {
             let mut request = json!({"technique": "auto", "volume": {"photon_transport": field},
                 "image": {"width": 96, "height": 72}, "budget": {"max_error": error}});
@@ -116,16 +129,24 @@ fn a_field_gets_the_photons_that_its_picture_needs_and_no_more() {
             let found = plan(bench, &request);
             let photons = found.photons.unwrap();
             assert_eq!(found.request["volume"]["photon_transport"]["photons"], photons, "{name}");
-            let error_with = |photons_planned: u64| {
+            let truth = Truth::of(bench, &request, 128, Some(16 * photons));
+            // A field may be a lucky one: what is promised of nineteen in twenty is more than true of their mean square.
+            let error_with = |photons: u64| {
                 let mut planned = found.request.clone();
-                planned["volume"]["photon_transport"]["photons"] = json!(photons_planned);
-                error_of(bench, &request, &planned, 128, Some(12 * photons))
+                let squared = (1..=4).map(|seed| {
+                    let field = &mut planned["volume"]["photon_transport"];
+                    (field["photons"], field["seed"]) = (json!(photons), json!(seed));
+                    truth.error(bench, &planned).powi(2)
+                });
+                (squared.sum::<f64>() / 4.0).sqrt()
             };
-            let (enough, fewer) = (error_with(photons), error_with(photons / 4));
-            eprintln!("{name}: {photons} photons, {enough} for {error}, {fewer} with a fourth of them");
-            assert!(enough <= error && fewer > error, "{name}: {enough}, and {fewer} with a fourth of {photons}");
+            let (enough, fewer) = (error_with(photons), error_with(photons / 16));
+            eprintln!("{name}: {photons} photons, {enough} for {error}, {fewer} with a sixteenth of them");
+            assert!(enough <= error && fewer > error, "{name}: {enough}, and {fewer} with a sixteenth of {photons}");
             request["volume"]["photon_transport"]["photons"] = json!(5000);
-            assert_eq!(plan(bench, &request).photons, Some(5000), "{name}: what is said is kept");
+            let kept = plan(bench, &request);
+            assert_eq!(kept.photons, Some(5000), "{name}: what is said is kept");
+            assert!(kept.samples < 1000 && kept.reasons[0].contains("comes nearest"), "{name}: {:?}", kept.reasons);
         }
     });
 }
