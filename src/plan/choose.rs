@@ -261,9 +261,11 @@ mod tests {
         }
     }
 
-    fn chosen(pilots: &[Pilot], error: f64, time_ms: Option<f64>, photons: Option<&Photons>) -> Chosen {
-        let says_error = time_ms.is_none() || photons.is_some();
-        let wish = Wish { error, time_ms, says_error };
+    fn wish(error: f64, time_ms: Option<f64>) -> Wish {
+        Wish { error, time_ms, says_error: true }
+    }
+
+    fn chosen(pilots: &[Pilot], wish: Wish, photons: Option<&Photons>) -> Chosen {
         let (places, calibration) = (&Places::default(), &Calibration::default());
         Choice { pilots, places, wish, image: [100, 100], calibration, most: 1000, photons }.choose()
     }
@@ -272,11 +274,11 @@ mod tests {
     fn the_cheapest_that_is_enough_is_taken() {
         let pilots = [pilot("all", 1.0, 0.0, 10.0), pilot("some", 1.0, 0.05, 2.0), pilot("few", 1.0, 0.5, 1.0)];
         // 0.99 × 0.2 = 0.198: √(0.198² − 0.05²) = 0.1916, 28 samples of 2 ms.
-        let loose = chosen(&pilots, 0.2, None, None);
+        let loose = chosen(&pilots, wish(0.2, None), None);
         assert_eq!((loose.index, loose.amount.samples), (1, 28));
         assert!((loose.device_ms.value - 56.0).abs() < 1e-9 && loose.error.value <= 0.198, "{:?}", loose.device_ms);
         // 0.0495 is less than the bias of 0.05: all paths are needed, 409 of them.
-        let tight = chosen(&pilots, 0.05, None, None);
+        let tight = chosen(&pilots, wish(0.05, None), None);
         assert_eq!((tight.index, tight.amount.samples), (0, 409));
         assert!(tight.considered[1].why.contains("however many"), "{:?}", tight.considered[1]);
     }
@@ -284,11 +286,29 @@ mod tests {
     #[test]
     fn in_a_given_time_the_most_accurate_is_taken() {
         let pilots = [pilot("all", 1.0, 0.0, 10.0), pilot("some", 1.0, 0.05, 2.0)];
-        let short = chosen(&pilots, 0.02, Some(100.0), false);
-        assert_eq!((short.index, short.samples), (1, 50));
-        let long = chosen(&pilots, 0.02, Some(8000.0), false);
-        assert_eq!((long.index, long.samples), (0, 800));
-        let both = chosen(&pilots, 0.02, Some(100.0), true);
+        let short = chosen(&pilots, Wish { says_error: false, ..wish(0.02, Some(100.0)) }, None);
+        assert_eq!((short.index, short.amount.samples), (1, 50));
+        let long = chosen(&pilots, Wish { says_error: false, ..wish(0.02, Some(8000.0)) }, None);
+        assert_eq!((long.index, long.amount.samples), (0, 800));
+        let both = chosen(&pilots, wish(0.02, Some(100.0)), None);
         assert!(both.reasons[0].contains("nothing is within 2.00 % in 100 ms"), "{:?}", both.reasons);
+    }
+
+    #[test]
+    fn photons_and_samples_share_an_error_and_a_time() {
+        let pilots = [pilot("all", 1.0, 0.0, 1.0)];
+        let photons = Photons { squared: 1000.0, chance: 1.0, ms: [0.0, 1e-3], given: None, most: u64::MAX };
+        // 0.099² = 1/n + 1000/N costs n + N/1000 + 5, the least where n = N/1000: 205 of each.
+        let error = chosen(&pilots, wish(0.1, None), Some(&photons));
+        let Amount { samples, photons: Some(n) } = error.amount else { panic!("{:?}", error.amount) };
+        assert!((195..=215).contains(&samples) && (195_000..=215_000).contains(&n), "{:?}", error.amount);
+        assert!(error.enough && error.error.value <= 0.099 && error.device_ms.value < 420.0, "{:?}", error.device_ms);
+        // What is left of 205 ms after the pictures on the way, a half each.
+        let time = chosen(&pilots, Wish { says_error: false, ..wish(0.1, Some(205.0)) }, Some(&photons));
+        assert!((95..=105).contains(&time.amount.samples) && time.device_ms.value <= 205.0, "{:?}", time.amount);
+        // With too few photons no sample helps: of samples there are enough to be small beside them.
+        let given = Photons { given: Some(1000), ..photons };
+        let few = chosen(&pilots, wish(0.1, None), Some(&given));
+        assert_eq!((few.enough, few.amount), (false, Amount { samples: 16, photons: Some(1000) }), "{:?}", few.reasons);
     }
 }

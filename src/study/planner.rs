@@ -139,20 +139,24 @@ pub fn planner(bench: &Bench, scenes: Range<u64>, told: &mut dyn FnMut(&str)) ->
     Ok(Planned { machine: machine(bench), scenes: outcomes })
 }
 
-/// A random scene: three in five scatter light, the others are composites.
+/// Scenes from this one on are of voxels finer than the pixels.
+const FINE: u64 = 100;
+
+/// A random scene: three in five scatter light, the others are composites, as are those of fine voxels.
 fn scene(seed: u64) -> Value {
     let mut random = Random::new(1000 + seed);
     let mut unit = || random.unit();
     let volumes = ["smoke", "gaussian", "sphere", "marschner_lobb", "smoke", "constant"];
-    let resolution = [32, 64, 96][(unit() * 3.0) as usize];
+    let fine = seed >= FINE;
+    let resolution = if fine { [160, 192, 256] } else { [32, 64, 96] }[(unit() * 3.0) as usize];
     let volume = json!({"builtin": volumes[(unit() * 6.0) as usize], "resolution": resolution, "seed": seed});
     let (turn, height) = (std::f64::consts::TAU * unit(), unit() - 0.3);
     let far = 2.6 + 1.2 * unit();
     let eye = [far * turn.cos(), far * height, far * turn.sin()];
     let mut request = json!({"technique": "auto", "volume": volume, "camera": {"eye": eye, "fov_y_deg": 36.0 + 14.0 * unit()},
-        "image": {"width": 256, "height": 192}, "seed": 5});
+        "image": if fine { json!({"width": 80, "height": 60}) } else { json!({"width": 256, "height": 192}) }, "seed": 5});
     let logarithmic = |u: f64, least: f64, most: f64| least * (most / least).powf(u);
-    if seed % 5 < 3 {
+    if seed % 5 < 3 && !fine {
         let albedo = [0.0, 0.3, 0.6, 0.9, 0.98][(unit() * 5.0) as usize];
         request["medium"] = json!({"sigma_t_per_unit": logarithmic(unit(), 0.05, 15.0), "albedo": albedo,
             "phase": {"type": "henyey_greenstein", "g": 0.9 * unit()}});
@@ -217,5 +221,6 @@ fn words(request: &Value, plan: &Plan, samples: u64) -> String {
         1 => ", without the faintest light".into(),
         n => format!(", without the {n} faintest lights"),
     };
-    format!("{}{options}{fewer}; samples: {samples}", plan.technique)
+    let level = plan.request["volume"].get("level").map_or(String::new(), |l| format!(", level {l} of the volume"));
+    format!("{}{options}{level}{fewer}; samples: {samples}", plan.technique)
 }

@@ -96,11 +96,41 @@ async fn a_time_that_is_too_short_is_said_to_be() {
 }
 
 #[tokio::test]
+async fn a_field_is_planned_with_its_photons_and_can_be_posted() {
+    let server = shared();
+    let api = Api::new(&server);
+    let field = json!({"grid": [16, 16, 16], "albedo": 0.9});
+    let mut body = json!({"technique": "auto", "volume": {"photon_transport": field}, "image": {"width": 64, "height": 48},
+        "emission_absorption": {}, "budget": {"max_error": 0.3}});
+    let found = plan(&api, &body).await;
+    let photons = found["photons"].as_u64().unwrap();
+    assert_eq!(found["request"]["volume"]["photon_transport"]["photons"], photons);
+    assert!(found["reasons"].to_string().contains(&format!("{photons} photons")), "{}", found["reasons"]);
+    assert!(considered(&found, "emission_absorption, the shortest step")["photons"].as_u64() > Some(0), "{found}");
+    let done = api.finish(&body).await;
+    assert!(done["plan"]["planned"]["photons"].as_u64() > Some(0), "{}", done["plan"]);
+    assert!(done["result"]["ledger"]["absorbed"]["value"].as_f64() > Some(0.0), "{}", done["result"]);
+    body["budget"] = json!({"time_ms": 300});
+    let in_time = plan(&api, &body).await;
+    assert!(in_time["photons"].as_u64() > Some(1000), "{in_time}");
+    assert!(in_time["device_ms"]["value"].as_f64() <= Some(300.0), "{}", in_time["device_ms"]);
+}
+
+#[tokio::test]
 async fn what_cannot_be_planned_names_its_field() {
     let server = shared();
     let api = Api::new(&server);
     for (body, pointer) in [
-        (json!({"technique": "auto", "volume": {"photon_transport": {"photons": 1000}}}), "/volume"),
+        (
+            json!({"technique": "auto", "volume": {"photon_transport": {"photons": 0}}}),
+            "/volume/photon_transport/photons",
+        ),
+        (json!({"technique": "auto", "volume": {"builtin": "smoke", "level": 9}}), "/volume/level"),
+        (
+            json!({"technique": "emission_absorption", "volume": {"builtin": "smoke", "level": 1},
+                "emission_absorption": {"transfer_function": {"preset": "labels"}}}),
+            "/volume/level",
+        ),
         (json!({"technique": "auto", "medium": {"albedo": 2}}), "/medium/albedo"),
         (json!({"technique": "auto", "image": {"width": 0}}), "/image/width"),
         (json!({"technique": "auto", "budget": {"max_error": -1}}), "/budget/max_error"),

@@ -102,6 +102,8 @@ fn cases() -> Vec<(&'static str, Value, &'static str)> {
         ("/volume", json!({"id": "../../etc/passwd"}), "/volume/id"),
         ("/volume", json!({"id": ""}), "/volume/id"),
         ("/volume", json!({"builtin": "teapot"}), "/volume/builtin"),
+        ("/volume", json!({"builtin": "smoke", "level": 9}), "/volume/level"),
+        ("/volume", json!({"photon_transport": {}, "level": 1}), "/volume/level"),
         ("/volume", json!({"builtin": "smoke", "resolution": 7}), "/volume/resolution"),
         ("/volume", json!({"builtin": "smoke", "resolution": 513}), "/volume/resolution"),
         ("/volume", json!({"builtin": "smoke", "resolution": 1e9}), "/volume/resolution"),
