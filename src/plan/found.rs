@@ -25,11 +25,14 @@ const PART: f64 = 0.9;
 const MOST: f64 = 0.25;
 
 /// What the pilots found.
+#[derive(Default)]
 pub struct Found {
     /// Of those that were run, the reference first.
     pub pilots: Vec<Pilot>,
     /// What the places in a pixel miss, of all of them.
     pub places: Places,
+    /// The same as the reference's pilot saw it, which is of all of the picture.
+    pub everywhere: Places,
     /// Pixels of the reference's pilot that matter.
     pub matter: f64,
     /// Where in the picture what the places miss is, if that is a small part of it, and what a mean of squares there is in the picture.
@@ -44,7 +47,9 @@ impl Found {
         let Some((region, part)) = self.part else { return Ok(self.places.clone()) };
         let [a, b] = asked.run_two(candidate, region, samples).await?;
         let within = deviation(a.film.random_noise().1);
-        Ok(Places::by_two(a.rounds(), b.rounds(), scale / part.sqrt(), within))
+        let places = Places::by_two(a.rounds(), b.rounds(), scale / part.sqrt(), within);
+        // Few samples that are good there may be bad elsewhere, as along an edge of another direction.
+        Ok(places.at_least(&self.everywhere))
     }
 
     /// Looks at what the places miss after `samples` of a pilot that are likely to be planned, unless that is known.
@@ -98,7 +103,9 @@ impl Found {
     /// picture tell how much the places miss and where that is.
     async fn look_closer(&mut self, asked: Asked<'_>, candidate: &Candidate, seen: &WholePicture) -> Result<()> {
         let by_chance = seen.random / f64::from(asked.image[0]).sqrt() / f64::from(asked.image[1]).sqrt();
-        if self.part.is_some() || seen.missed <= (SURE * by_chance).max(SMALL * seen.random) {
+        // A pilot that has all of the pixels has seen it.
+        let all = Region::some(PIXELS, [0, 0], asked.image).apart == 1;
+        if all || self.part.is_some() || seen.missed <= (SURE * by_chance).max(SMALL * seen.random) {
             return Ok(());
         }
         let more = self.places.more_by(seen.samples, seen.missed);

@@ -56,6 +56,15 @@ impl Places {
         Self { known: known.collect(), steps: steps.collect(), more: 1.0, within, hopeful: true }
     }
 
+    /// No less than what another look found after as many samples.
+    pub fn at_least(mut self, other: &Self) -> Self {
+        for known in &mut self.known {
+            let seen = other.known.iter().find(|k| k.samples == known.samples);
+            known.squared = seen.map_or(known.squared, |k| k.squared.max(known.squared));
+        }
+        self
+    }
+
     /// By more samples of one setting of which J² is known: |Iₙ − I_N|² = P² + J² (1/n − 1/N).
     pub fn look_deeper(&mut self, rounds: &[Arc<Round>], scale: f64, random: f64) {
         let Some(last) = rounds.last() else { return };

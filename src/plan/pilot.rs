@@ -90,8 +90,7 @@ pub fn chance(pixels: f64, numbers: f64) -> f64 {
 pub async fn run_all(asked: Asked<'_>, candidates: &[Candidate], most: f64) -> Result<Found> {
     let region = Region::some(PIXELS, [0, 0], asked.image);
     let mut references: Option<([Run; 2], f64)> = None;
-    let mut found =
-        Found { pilots: Vec::new(), places: Places::default(), matter: 0.0, part: None, skipped: Vec::new() };
+    let mut found = Found::default();
     let mut too_much: Vec<&str> = Vec::new();
     for candidate in candidates {
         if let Some(less) = candidate.less.iter().find(|less| too_much.contains(&less.as_str())) {
@@ -116,6 +115,7 @@ pub async fn run_all(asked: Asked<'_>, candidates: &[Candidate], most: f64) -> R
         if references.is_none() {
             found.matter = runs[0].film.random_noise().1;
             found.places = Places::by_two(a, b, scale, deviation(found.matter));
+            found.everywhere = found.places.clone();
         }
         found.pilots.push(Pilot {
             candidate: candidate.clone(),
