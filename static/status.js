@@ -28,6 +28,8 @@ const set = (id, text) => {
 export class Status {
   #first = true;
   #chartUrl = null;
+  /** What the planner expects of this render, until the camera moves. */
+  #planned = null;
 
   constructor() {
     byId('links').addEventListener('click', (event) => this.#fetchWithToken(event));
@@ -41,12 +43,14 @@ export class Status {
   /** A new render, or the same from another camera: numbers start again. */
   restart() {
     this.#first = true;
+    this.#planned = null;
     this.state('running');
     set('stopped', '–');
   }
 
   created(resource) {
     this.restart();
+    this.#planned = resource.plan?.planned ?? null;
     this.state(resource.state ?? 'queued');
     this.#plan(resource.plan);
     this.#links(resource.id);
@@ -63,7 +67,7 @@ export class Status {
       this.#first = false;
     }
     set('samples', frame.samples === null ? '–' : String(frame.samples));
-    set('error', frame.error === null ? 'unknown' : percent(frame.error));
+    set('error', frame.error === null ? 'unknown' : this.#error(frame.error, frame.samples));
     set('elapsed', milliseconds(frame.elapsedMs));
     set('lowered', frame.lowered ? `Lowered for now: ${frame.lowered}` : '');
     byId('lowered').hidden = !frame.lowered;
@@ -74,13 +78,20 @@ export class Status {
     this.state(resource.state);
     const { timings = {} } = resource;
     if (Number.isFinite(resource.samples)) set('samples', String(resource.samples));
-    if (Number.isFinite(resource.error)) set('error', percent(resource.error));
+    if (Number.isFinite(resource.error)) set('error', this.#error(resource.error, resource.samples));
     if (Number.isFinite(timings.elapsed_ms)) set('elapsed', milliseconds(timings.elapsed_ms));
     if (Number.isFinite(timings.first_frame_ms)) set('first-frame', milliseconds(timings.first_frame_ms));
     set('stopped', STOPPED[resource.stopped_by] ?? resource.stopped_by ?? '–');
     this.#plan(resource.plan);
     this.#report(resource);
     this.#chart(resource.id);
+  }
+
+  /** A picture of few samples knows only a bound; once it has those that were planned, the plan's pilots knew better. */
+  #error(error, samples) {
+    const planned = this.#planned;
+    const better = planned && samples >= planned.samples && planned.error.value < error;
+    return better ? `${percent(planned.error.value)} by the plan (at most ${percent(error)})` : percent(error);
   }
 
   #report(resource) {
@@ -145,7 +156,8 @@ export class Status {
 /** What the planner expects, where it was asked. */
 function predicted(planned) {
   if (!planned) return '';
-  return `, ${planned.samples} ${planned.samples === 1 ? 'sample' : 'samples'}, about ${milliseconds(planned.device_ms.value)} on the device, ${percent(planned.error.value)} wrong`;
+  const photons = planned.photons ? `${brief(planned.photons)} photons, ` : '';
+  return `, ${photons}${planned.samples} ${planned.samples === 1 ? 'sample' : 'samples'}, about ${milliseconds(planned.device_ms.value)} on the device, ${percent(planned.error.value)} wrong`;
 }
 
 function table(caption, rows) {

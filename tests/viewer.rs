@@ -226,5 +226,10 @@ async fn a_ticked_box_leaves_the_settings_to_the_planner() {
     page.until("a plan", "document.querySelector('#plan').textContent.includes('on the device')").await;
     page.settled().await;
     assert!(page.text("#plan").await.contains("sample"), "{}", page.text("#plan").await);
+    // A sample or two know little of their error: the plan's pilots measured it.
+    assert!(page.text("#error").await.contains("by the plan"), "{}", page.text("#error").await);
+    page.after("a frame after +", page.press(&['+'])).await;
+    page.settled().await;
+    assert!(!page.text("#error").await.contains("by the plan"), "the plan was of another camera");
     page.close().await;
 }
