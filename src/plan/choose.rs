@@ -80,13 +80,13 @@ impl Choice<'_> {
     }
 
     /// Device time, ms.
-    fn cost(&self, p: &Pilot, amount: Amount) -> f64 {
+    pub(super) fn cost(&self, p: &Pilot, amount: Amount) -> f64 {
         let [besides, sample] = self.picture_ms(p);
         let field = self.photons.zip(amount.photons).map_or(0.0, |(photons, n)| photons.cost(n, besides + sample));
         field + besides + sample * f64::from(amount.samples)
     }
 
-    fn error(&self, p: &Pilot, amount: Amount) -> f64 {
+    pub(super) fn error(&self, p: &Pilot, amount: Amount) -> f64 {
         let of_field = self.photons.zip(amount.photons).map_or(0.0, |(photons, n)| photons.squared_after(n, 1.0));
         (p.error_after(f64::from(amount.samples), self.places).powi(2) + of_field).sqrt()
     }
@@ -169,67 +169,11 @@ impl Choice<'_> {
             considered: considered.collect(),
         }
     }
-
-    /// `needed` is what the error asked for takes, or what fits into the time where only that was asked for, and its time.
-    fn considered(&self, p: &Pilot, needed: Option<(Amount, f64)>) -> Considered {
-        let (bias, wish) = (p.bias + p.bias_within, self.wish);
-        let late = |ms: f64| wish.time_ms.filter(|t| wish.says_error && ms > *t);
-        let why = match needed {
-            Some((n, ms)) if late(ms).is_some() => format!("{n} would bring it there, but in about {ms:.0} ms"),
-            Some((n, _)) => format!("{n} bring it to {}", percent(self.error(p, n))),
-            None if bias >= AIM * wish.error => {
-                format!("wrong by up to {} however many samples it takes", percent(bias))
-            }
-            None if self.photons.is_some() => "more photons or samples than are permitted would be needed".into(),
-            None => "more samples than are permitted would be needed".into(),
-        };
-        Considered {
-            words: p.candidate.words.clone(),
-            technique: p.candidate.technique.clone(),
-            samples: needed.map(|e| e.0.samples),
-            photons: needed.and_then(|e| e.0.photons),
-            device_ms: needed.map(|e| e.1),
-            error: needed.map(|(n, _)| self.error(p, n)),
-            bias: Some(p.bias),
-            enough: needed.is_some_and(|(_, ms)| late(ms).is_none()),
-            why,
-        }
-    }
-
-    fn reason(&self, best: &Pilot, amount: Amount, [time, error]: [f64; 2], enough: bool) -> String {
-        let (words, wish) = (&best.candidate.words, self.wish);
-        let [asked, error] = [wish.error, error].map(percent);
-        match (enough, wish.time_ms) {
-            (true, _) => {
-                format!("{words}: the cheapest that is within {asked}: {amount}, about {time:.1} ms on the device")
-            }
-            (false, Some(t)) if wish.says_error => {
-                format!("nothing is within {asked} in {t} ms; {words} comes nearest: {amount}, about {error}")
-            }
-            (false, Some(t)) => format!("{words}: the most accurate in {t} ms: {amount}, about {error}"),
-            (false, None) => {
-                format!("nothing that is permitted is within {asked}; {words} comes nearest, with {error}")
-            }
-        }
-    }
-}
-
-impl std::fmt::Display for Amount {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        if let Some(photons) = self.photons {
-            write!(f, "{photons} photons, ")?;
-        }
-        write!(f, "{} samples", self.samples)
-    }
 }
 
 /// Parts of a squared error, or of a time, that a view may have where the rest is its field's.
 fn parts() -> impl Iterator<Item = f64> {
     (0..=PARTS).map(|i| 0.5 - 0.49 * (std::f64::consts::PI * f64::from(i) / f64::from(PARTS)).cos())
-}
-
-fn percent(v: f64) -> String {
-    format!("{:.2} %", 100.0 * v)
 }
 
 #[cfg(test)]
@@ -300,8 +244,8 @@ mod tests {
         let photons = Photons { squared: 1000.0, chance: 1.0, ms: [0.0, 1e-3], given: None, most: u64::MAX };
         // 0.099² = 1/n + 1000/N costs n + N/1000 + 5, the least where n = N/1000: 205 of each.
         let error = chosen(&pilots, wish(0.1, None), Some(&photons));
-        let Amount { samples, photons: Some(n) } = error.amount else { panic!("{:?}", error.amount) };
-        assert!((195..=215).contains(&samples) && (195_000..=215_000).contains(&n), "{:?}", error.amount);
+        let n = error.amount.photons.unwrap_or(0);
+        assert!((195..=215).contains(&error.amount.samples) && (195_000..=215_000).contains(&n), "{:?}", error.amount);
         assert!(error.enough && error.error.value <= 0.099 && error.device_ms.value < 420.0, "{:?}", error.device_ms);
         // What is left of 205 ms after the pictures on the way, a half each.
         let time = chosen(&pilots, Wish { says_error: false, ..wish(0.1, Some(205.0)) }, Some(&photons));

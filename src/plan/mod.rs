@@ -1,9 +1,10 @@
 //! The planner: model no more than a scene needs.
 //!
 //! A request says what is looked at and how wrong the picture may be or how long it may take. From the scene's [`features`] come the
-//! settings that could do (`candidates`), less those that a bound rules out; a `pilot` of a few thousand pixels of the picture itself
-//! measures what each of the rest costs here and is wrong by; what was `found` is looked at closer where that might be the best, and the
-//! likely one is confirmed on the whole picture; `choose` takes the cheapest that is enough, or the best that is in time, and says why in words.
+//! `settings` that could do, less those that a bound rules out; a `pilot` of a few thousand pixels of the picture itself measures what each
+//! of the rest costs here and is wrong by; what was `found` is looked at closer where that might be the best, and the likely one is
+//! confirmed on the whole picture; `choose` takes the cheapest that is enough, or the best that is in time, and says why in `words`. Of a
+//! field that is yet to be computed some small ones stand for it, and tell how many `photons` its picture needs.
 //!
 //! What grows how is what the study measured: random `noise` falls as the root of the samples, what the places in a pixel miss by a power
 //! between ½ and 1 and not everywhere; time is linear in samples and pixels.
@@ -19,6 +20,7 @@ mod pilot;
 mod reply;
 mod run;
 mod settings;
+mod words;
 
 use serde_json::{Value, json};
 
