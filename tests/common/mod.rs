@@ -5,6 +5,7 @@
 
 pub mod engine;
 pub mod light;
+pub mod processes;
 
 use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
