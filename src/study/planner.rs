@@ -80,7 +80,8 @@ impl Planned {
         let ([met, timed, cheap], n) = (self.figures(), self.scenes.len());
         let mut text = format!(
             "# Does the planner keep its word?\n\n{n} random scenes of fixed seeds, each planned for a `max_error`, rendered as planned, and \
-            compared with a long run of another tracker or a finer step, and with every setting tried by force. Measured on {}, {} threads, \
+            compared with a long run of another tracker or a finer step, and with every setting tried by force. From scene {FINE} on voxels are finer than \
+            pixels. A plan that says itself that nothing which is permitted is within the error is not run, and counts as missed. Measured on {}, {} threads, \
             {}; version {} ({}). `./dev study --case planner` makes this page.\n\n| | plans | of |\n|---|---|---|\n\
             | the true error is at most the one asked for | {met} | {n} |\n\
             | the device time is within a factor of {TIME_FACTOR} of the predicted one | {timed} | {n} |\n\
@@ -176,11 +177,32 @@ fn scene(seed: u64) -> Value {
     request
 }
 
+/// Of a plan that says itself that nothing which is permitted is within the error: it is not run, and kept to nothing.
+fn not_enough(scene: u64, request: &Value, asked: f64, plan: &Plan) -> Outcome {
+    Outcome {
+        scene,
+        request: request.clone(),
+        asked,
+        planned: format!(
+            "not run, as nothing that is permitted is enough: {}",
+            words(request, plan, plan.samples.into())
+        ),
+        true_error: plan.error.value.max(asked.next_up()),
+        predicted_ms: plan.device_ms.value,
+        measured_ms: 0.0,
+        cheapest: None,
+        cheapest_ms: None,
+    }
+}
+
 fn outcome(bench: &Bench, scene: u64, request: &Value) -> Result<Outcome> {
     let asked = request["budget"]["max_error"].as_f64().unwrap_or(0.0);
+    let plan = bench.plan(request)?;
+    if !plan.considered.iter().any(|c| c.enough) {
+        return Ok(not_enough(scene, request, asked, &plan));
+    }
     let settings = bench.settings(request)?;
     let known = truth(bench, &settings[0].1, asked)?;
-    let plan = bench.plan(request)?;
     let (run, mut measured_ms) = timed(bench, &plan.request)?;
     let true_error = known.error(&run)?;
     // What is dearer than the plan, or than the cheapest so far, need not be tried any further.
