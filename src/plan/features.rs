@@ -20,11 +20,18 @@ pub struct Features {
     pub optical_depth: Option<[f64; 3]>,
     /// The greatest part of a collision that is scattered.
     pub albedo: Option<f64>,
+    /// The mean cosine of the angle that a scattering turns light by.
+    pub anisotropy: Option<f64>,
     /// What of the light that a slab of the volume's least depth sends back was scattered more than once: the bound by which multiple
     /// scattering may be left out.
     pub multiple_scattering: Option<f64>,
     /// What part each light but a sky has of the light in the middle of the volume, with its place in the request.
     pub light_shares: Vec<(usize, f64)>,
+    /// What a voxel's optical depth changes by where the value goes through its range from one voxel to the next, at the slope of the
+    /// transfer function's steepest part.
+    pub steepest_slope: Option<f64>,
+    /// The part of the pixels that are opaque, where a view ends its rays there.
+    pub opaque: Option<f64>,
     /// Sides of the smallest voxel over the side of a pixel where the volume's middle is.
     pub pixels_per_voxel: f64,
 }
@@ -38,11 +45,16 @@ impl Features {
             greatest_along_axes(volume, |v| m.density_of(v)).map(|d| sigma * d)
         });
         let albedo = medium.as_ref().map(|m| m.albedo.rgb().into_iter().fold(0.0, f64::max));
+        let voxel = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
+        let width = volume.range()[1] - volume.range()[0];
         let least = depth.map(|d| d.into_iter().fold(f64::INFINITY, f64::min));
         Self {
             homogeneous: volume.non_finite() == 0 && volume.range()[0] == volume.range()[1],
             optical_depth: depth,
             albedo,
+            anisotropy: medium.as_ref().and_then(|m| m.phase.mean_cosine()),
+            steepest_slope: scene.view().steepest_slope(volume).map(|slope| slope * width * voxel),
+            opaque: None,
             multiple_scattering: least.zip(albedo).map(|(depth, albedo)| missing(depth, albedo, 1)),
             light_shares: light_shares(volume, request),
             pixels_per_voxel: pixels_per_voxel(scene, volume),
@@ -72,9 +84,23 @@ impl Features {
             let [least, most] =
                 [depth.into_iter().fold(f64::INFINITY, f64::min), depth.into_iter().fold(0.0, f64::max)];
             words.push(format!("optical depth up to {least:.3} to {most:.3} along its axes, albedo {albedo}"));
+            if let Some(g) = self.anisotropy.filter(|g| *g != 0.0 && albedo > 0.0) {
+                words.push(format!("light is turned by a mean cosine of {g:.2}"));
+            }
             if albedo == 0.0 {
                 words.push("nothing is scattered: a path ends at its first collision".into());
             }
+        }
+        if let Some(slope) = self.steepest_slope {
+            words.push(format!(
+                "a voxel's optical depth is up to {slope:.2} from its neighbour's, were they as unlike as any two"
+            ));
+        }
+        if self.pixels_per_voxel < 1.0 {
+            words.push(format!("a voxel is {:.2} pixels wide", self.pixels_per_voxel));
+        }
+        if let Some(part) = self.opaque.filter(|part| *part > 0.0) {
+            words.push(format!("{:.0} % of the pixels are opaque: nothing behind is sampled", 100.0 * part));
         }
         words
     }

@@ -33,6 +33,8 @@ pub struct Found {
     pub places: Places,
     /// The same as the reference's pilot saw it, which is of all of the picture.
     pub everywhere: Places,
+    /// The part of the reference's pixels that are opaque.
+    pub opaque: f64,
     /// Pixels of the reference's pilot that matter.
     pub matter: f64,
     /// Where in the picture what the places miss is, if that is a small part of it, and what a mean of squares there is in the picture.

@@ -81,7 +81,7 @@ impl Planner<'_> {
         // One for all of its pilots.
         let _place = self.engine.reserve()?;
         let family = Family::of(body);
-        let seen = self.see(body, family).await?;
+        let mut seen = self.see(body, family).await?;
         let wish = Wish::of(&seen.scene);
         let (candidates, mut considered) = settings::candidates(body, family, &seen.features, wish.error);
         let possible: Vec<Candidate> =
@@ -91,6 +91,7 @@ impl Planner<'_> {
         // What is wrong by too much is of no use, unless all that there is time for is.
         let useless = if wish.time_ms.is_none() { wish.error } else { f64::INFINITY };
         let mut found = pilot::run_all(asked, &possible, useless).await?;
+        seen.features.opaque = (family != Family::Scattering).then_some(found.opaque);
         let photons = match &seen.simulated {
             Some(simulated) => Some(simulated.photons(asked, &seen.reference, seen.features.pixels_per_voxel).await?),
             None => None,

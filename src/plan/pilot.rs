@@ -116,6 +116,7 @@ pub async fn run_all(asked: Asked<'_>, candidates: &[Candidate], most: f64) -> R
             found.matter = runs[0].film.random_noise().1;
             found.places = Places::by_two(a, b, scale, deviation(found.matter));
             found.everywhere = found.places.clone();
+            found.opaque = runs[0].opaque();
         }
         found.pilots.push(Pilot {
             candidate: candidate.clone(),

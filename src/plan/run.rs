@@ -13,6 +13,9 @@ use crate::scene::Scene;
 use crate::scene::region::Region;
 use crate::volume::Volume;
 
+/// From this alpha on a pixel counts as opaque.
+const OPAQUE: f32 = 0.99;
+
 /// A finished pilot render.
 pub struct Run {
     /// What it gathered.
@@ -32,6 +35,11 @@ impl Run {
     /// Of a pixel, linear.
     pub fn luminance(&self, pixel: usize) -> f64 {
         self.film.main.luminance(pixel)
+    }
+
+    /// The part of the pixels that are opaque.
+    pub fn opaque(&self) -> f64 {
+        mean(self.film.main.mean.chunks_exact(4).map(|p| f64::from(u8::from(p[3] > OPAQUE))))
     }
 
     /// The mean luminance.

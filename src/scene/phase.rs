@@ -43,6 +43,17 @@ impl Default for Phase {
 }
 
 impl Phase {
+    /// The mean cosine of the angle that light is turned by; none where that depends on an energy.
+    pub fn mean_cosine(&self) -> Option<f64> {
+        match (self.kind.as_str(), &self.cosines, &self.densities) {
+            ("henyey_greenstein", ..) => Some(self.g),
+            ("two_term_henyey_greenstein", ..) => Some(self.weight * self.g1 + (1.0 - self.weight) * self.g2),
+            ("tabulated", Some(cosines), Some(densities)) => Some(mean_of_linear(cosines, densities)),
+            ("klein_nishina", ..) => None,
+            _ => Some(0.0),
+        }
+    }
+
     /// Checks what the schema cannot say.
     ///
     /// # Errors
@@ -97,5 +108,34 @@ impl Phase {
             rows.extend([cosines[i] as f32, (densities[i] / total) as f32, below as f32]);
         }
         cosines.len()
+    }
+}
+
+/// ∫ x p dx / ∫ p dx of a density that is linear between points.
+fn mean_of_linear(x: &[f64], p: &[f64]) -> f64 {
+    let (mut first, mut whole) = (0.0, 0.0);
+    for (x, p) in x.windows(2).zip(p.windows(2)) {
+        let width = x[1] - x[0];
+        whole += 0.5 * width * (p[0] + p[1]);
+        first += width / 6.0 * (p[0] * (2.0 * x[0] + x[1]) + p[1] * (x[0] + 2.0 * x[1]));
+    }
+    if whole > 0.0 { first / whole } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mean_cosines_are_those_of_the_formulae() {
+        let of = |value| serde_json::from_value::<Phase>(value).map(|p| p.mean_cosine()).ok().flatten();
+        assert_eq!(of(serde_json::json!({"type": "henyey_greenstein", "g": 0.7})), Some(0.7));
+        assert_eq!(of(serde_json::json!({"type": "rayleigh"})), Some(0.0));
+        assert_eq!(of(serde_json::json!({"type": "klein_nishina"})), None);
+        let two = of(serde_json::json!({"type": "two_term_henyey_greenstein", "weight": 0.75, "g1": 0.8, "g2": -0.4}));
+        assert!(two.is_some_and(|g| (g - 0.5).abs() < 1e-12), "{two:?}");
+        // A density of 1 + μ over [−1, 1] has the mean 1/3.
+        let table = of(serde_json::json!({"type": "tabulated", "cosines": [-1, 0.2, 1], "densities": [0, 1.2, 2]}));
+        assert!(table.is_some_and(|g| (g - 1.0 / 3.0).abs() < 1e-12), "{table:?}");
     }
 }

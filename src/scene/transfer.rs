@@ -205,6 +205,14 @@ impl TransferFunction {
         }
     }
 
+    /// The greatest change of opacity per unit of length with the value, by the device's table.
+    pub fn steepest_slope(&self) -> f64 {
+        let [low, high] = self.domain();
+        let width = (high - low) / (TABLE_SIZE - 1) as f64;
+        let sigma = |i: usize| self.evaluate(low + width * i as f64).1;
+        (1..TABLE_SIZE).map(|i| (sigma(i) - sigma(i - 1)).abs() / width).fold(0.0, f64::max)
+    }
+
     /// The device's table for pre-integrated steps: for each entry the integrals from the first of extinction and of extinction
     /// times red, green and blue over the entries, then the integrands, all as floats.
     pub fn integrals(&self, opacity_scale: f64) -> Vec<u32> {

@@ -166,6 +166,10 @@ pub trait View: Send + Sync {
     fn clips(&self) -> bool {
         true
     }
+    /// The greatest change of opacity per unit of length with the value, where a transfer function gives it.
+    fn steepest_slope(&self, _volume: &Volume) -> Option<f64> {
+        None
+    }
     /// Whether values are labels, of which there is no mean.
     fn shows_labels(&self) -> bool {
         false

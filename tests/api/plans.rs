@@ -68,6 +68,28 @@ async fn models_are_dropped_where_a_bound_permits_it_and_not_elsewhere() {
 }
 
 #[tokio::test]
+async fn a_plan_says_what_the_scene_is_like() {
+    let server = shared();
+    let api = Api::new(&server);
+    let mut forward = fog(2.0, 0.8, &json!({"max_error": 0.2}));
+    forward["medium"]["phase"] = json!({"type": "henyey_greenstein", "g": 0.7});
+    let features = plan(&api, &forward).await["features"].clone();
+    assert_eq!((&features["anisotropy"], &features["albedo"]), (&json!(0.7), &json!(0.8)), "{features}");
+    assert!(features["optical_depth"][0].as_f64() > Some(0.0) && features["opaque"].is_null(), "{features}");
+    let wall = json!([{"value": 0, "color": [1, 1, 1], "opacity_per_unit": 0}, {"value": 0.5, "color": [1, 1, 1], "opacity_per_unit": 200}]);
+    let body = json!({"volume": {"builtin": "gaussian", "resolution": 64}, "image": {"width": 32, "height": 24}, "budget": {"max_error": 0.2},
+        "emission_absorption": {"transfer_function": {"points": wall}}});
+    let opaque = plan(&api, &body).await;
+    let features = &opaque["features"];
+    // 400 per unit of value, over a range of almost 1 and a voxel of 2 / 64.
+    let slope = features["steepest_slope"].as_f64().unwrap();
+    assert!((slope / 12.5 - 1.0).abs() < 0.05, "{slope}");
+    assert!(features["opaque"].as_f64().is_some_and(|part| part > 0.1 && part < 0.9), "{features}");
+    assert!(opaque["reasons"].to_string().contains("nothing behind is sampled"), "{}", opaque["reasons"]);
+    assert!(features["pixels_per_voxel"].as_f64() < Some(1.0), "{features}");
+}
+
+#[tokio::test]
 async fn an_automatic_render_is_planned_rendered_and_explained() {
     let server = shared();
     let api = Api::new(&server);

@@ -112,6 +112,12 @@ impl View for Parameters {
         coarse_step(self.step_voxels).into_iter().collect()
     }
 
+    fn steepest_slope(&self, volume: &Volume) -> Option<f64> {
+        let plain = self.regions.is_none() && !self.labels();
+        let function = plain.then(|| self.transfer_function(volume).ok()).flatten();
+        function.map(|(function, _)| self.opacity_scale * function.steepest_slope())
+    }
+
     fn shows_labels(&self) -> bool {
         self.labels()
     }
