@@ -115,9 +115,8 @@ impl Choice<'_> {
         let Some(photons) = self.photons else { return Some(Amount { samples: samples(time), photons: None }) };
         let left = time - photons.cost(0, besides + sample);
         let split = |part: f64| {
-            let photons = photons.in_time((1.0 - part) * left);
-            let left = time - self.photons.map_or(0.0, |p| p.cost(photons, besides + sample));
-            Amount { samples: samples(left), photons: Some(photons) }
+            let n = photons.in_time((1.0 - part) * left);
+            Amount { samples: samples(time - photons.cost(n, besides + sample)), photons: Some(n) }
         };
         parts().map(split).min_by(|a, b| self.error(p, *a).total_cmp(&self.error(p, *b)))
     }

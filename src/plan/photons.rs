@@ -17,8 +17,9 @@ use super::noise::in_common;
 use super::pilot::{PIXELS, SAMPLES};
 use super::run::{Asked, Run, mean, to_its_end};
 use crate::error::{Error, Result};
+use crate::film::Round;
 use crate::scene::region::Region;
-use crate::technique;
+use crate::technique::{self, Technique};
 use crate::volume::Volume;
 
 /// Photons of the first simulation, which tells how fast they are, and how long the second is to take, ms.
@@ -37,14 +38,14 @@ const MOST_FREEDOM: f64 = 1e4;
 /// A field as pilots see it.
 pub struct Simulated {
     technique: &'static str,
-    /// Of few photons, each with a seed of its own, and of many.
-    few: Vec<Arc<Volume>>,
-    many: Arc<Volume>,
-    photons: [u64; 2],
-    /// What the device takes besides the photons, and for one of them.
-    ms: [f64; 2],
     given: Option<u64>,
     most: u64,
+    /// Photons of the small ones.
+    few: u64,
+    /// The large one, its photons, and what these took, ms.
+    many: Arc<Volume>,
+    photons: u64,
+    ms: f64,
 }
 
 /// What is known of a field's photons.
@@ -63,49 +64,22 @@ pub struct Photons {
 }
 
 impl Simulated {
-    /// The field technique and the parameters of a request, if it looks at a field.
-    fn asked(body: &Value) -> Option<(&'static str, &Value)> {
-        let volume = body.get("volume")?;
-        technique::fields().find_map(|t| Some((t.name, volume.get(t.name)?)))
-    }
-
-    /// Simulates few photons and four times as many.
+    /// Simulates a few photons, which tell how many the small fields may have, and the large one.
     ///
     /// # Errors
     /// Those of the request.
     pub async fn of(planner: &Planner<'_>, body: &Value, reference: &Candidate) -> Result<Self> {
-        let (technique, own) = Self::asked(body).ok_or_else(|| Error::internal("a field of no technique"))?;
-        let given = own.get("photons").and_then(Value::as_u64);
-        let most = planner.limits.max_photons;
-        let simulate = async |photons: u64, seed: u64| -> Result<(Arc<Volume>, f64)> {
-            let mut request = reference.request(body);
-            let of = &mut request["volume"][technique];
-            let own_seed = of["seed"].as_u64().unwrap_or(0);
-            (of["photons"], of["seed"]) = (json!(photons), json!(own_seed ^ seed));
-            request["budget"] = json!({"samples": 1});
-            let scene = planner.scene(&request)?;
-            let region = Region::some(1.0, [0, 0], scene.image());
-            let job = to_its_end(planner, request, scene.into_pilot(region)).await?;
-            let speed = job.resource().pointer("/result/photons_per_ms").and_then(Value::as_f64).unwrap_or(0.0);
-            let field = job.field().ok_or_else(|| Error::internal("a pilot without its field"))?;
-            Ok((field, photons as f64 / speed.max(f64::MIN_POSITIVE)))
-        };
+        let asked = |t: &Technique| Some((t.name, body.get("volume")?.get(t.name)?));
+        let found = technique::fields().find_map(asked);
+        let (technique, own) = found.ok_or_else(|| Error::internal("a field of no technique"))?;
+        let (given, most) = (own.get("photons").and_then(Value::as_u64), planner.limits.max_photons);
+        let request = reference.request(body);
         let first = FIRST.min(most);
-        let (_, ms) = simulate(first, 1).await?;
+        let (_, ms) = simulate(planner, &request, technique, [first, 1]).await?;
         let few = ((PILOT_MS * first as f64 / ms) as u64).clamp(first, (most / MANY).max(first));
-        let many = (MANY * few).min(most);
-        let (mut fields, mut fewer_ms) = (Vec::new(), f64::INFINITY);
-        for seed in 0..FIELDS as u64 {
-            let (field, ms) = simulate(few, 2 + seed).await?;
-            fields.push(field);
-            fewer_ms = fewer_ms.min(ms);
-        }
-        let (field, more_ms) = simulate(many, 2 + FIELDS as u64).await?;
-        let (per, more) = (more_ms / many as f64, (many - few).max(1) as f64);
-        // Where few of them take as long as many, that is not their own time.
-        let one = ((more_ms - fewer_ms) / more).clamp(0.5 * per, per);
-        let ms = [more_ms - one * many as f64, one];
-        Ok(Self { technique, few: fields, many: field, photons: [few, many], ms, given, most })
+        let photons = (MANY * few).min(most);
+        let (many, ms) = simulate(planner, &request, technique, [photons, 2]).await?;
+        Ok(Self { technique, given, most, few, many, photons, ms })
     }
 
     /// What pilots look at.
@@ -113,44 +87,74 @@ impl Simulated {
         &self.many
     }
 
-    /// What the photons do to the picture, as the reference shows it.
+    /// Simulates the small fields, and sees what they do to the picture as the reference shows it.
     ///
     /// # Errors
     /// Those of the request.
     pub async fn photons(&self, asked: Asked<'_>, reference: &Candidate, pixels_per_voxel: f64) -> Result<Photons> {
         let region = Region::some(PIXELS, [0, 0], asked.image);
-        let look = async |field: &Arc<Volume>| -> Result<[Run; 2]> {
-            Asked { field: Some(field), ..asked }.run_two(reference, region, SAMPLES).await
+        let look = async |field: &Arc<Volume>| -> Result<(Run, [Arc<Round>; 2])> {
+            let [a, b] = Asked { field: Some(field), ..asked }.run_two(reference, region, SAMPLES).await?;
+            let last = |run: &Run| run.rounds().last().cloned();
+            let rounds = last(&a).zip(last(&b)).ok_or_else(|| Error::internal("a pilot without rounds"))?;
+            Ok((a, rounds.into()))
         };
-        let last = |run: &Run| run.rounds().last().cloned().ok_or_else(|| Error::internal("a pilot without rounds"));
-        let all = look(&self.many).await?;
-        let [a, b] = [last(&all[0])?, last(&all[1])?];
-        let (mut apart, mut of_fields) = (vec![0.0; all[0].pixels], Vec::new());
-        for field in &self.few {
-            let few = look(field).await?;
-            let [c, d] = [last(&few[0])?, last(&few[1])?];
+        let (run, [a, b]) = look(&self.many).await?;
+        let (mut apart, mut of_fields, mut ms) = (vec![0.0; run.pixels], Vec::new(), f64::INFINITY);
+        let request = reference.request(asked.body);
+        for seed in 3..3 + FIELDS as u64 {
+            // One at a time: they may be large.
+            let (field, took) = simulate(asked.planner, &request, self.technique, [self.few, seed]).await?;
+            let (_, [c, d]) = look(&field).await?;
             let products: Vec<f64> = in_common([&c, &a], [&d, &b]).collect();
             of_fields.push(mean(products.iter().copied()));
             apart.iter_mut().zip(products).for_each(|(sum, p)| *sum += p / FIELDS as f64);
+            ms = ms.min(took);
         }
-        let scale = all[0].mean();
-        let per_photon = 1.0 / self.photons[0] as f64 + 1.0 / self.photons[1] as f64;
-        let squared = mean(apart.iter().copied()).max(0.0) / (scale * scale) / per_photon;
+        let per_photon = 1.0 / self.few as f64 + 1.0 / self.photons as f64;
+        let squared = mean(apart.iter().copied()).max(0.0) / run.mean().powi(2) / per_photon;
         // Pixels of one voxel are one.
         let alike = (pixels_per_voxel / f64::from(region.apart)).max(1.0).powi(2);
         Ok(Photons {
             squared,
             chance: by_chance((independent(&apart) / alike).min(freedom(&of_fields))),
-            ms: self.ms,
+            ms: self.line(ms),
             given: self.given,
             most: self.most,
         })
+    }
+
+    /// What the device takes besides the photons and for one of them, where the small fields take so long.
+    fn line(&self, few_ms: f64) -> [f64; 2] {
+        let each = self.ms / self.photons as f64;
+        // What few of them take as long for as many is not their own time.
+        let one = ((self.ms - few_ms) / (self.photons - self.few).max(1) as f64).clamp(0.5 * each, each);
+        [self.ms - one * self.photons as f64, one]
     }
 
     /// The request with so many of them.
     pub fn with_photons(&self, request: &mut Value, photons: u64) {
         request["volume"][self.technique]["photons"] = json!(photons);
     }
+}
+
+/// The field of a request with so many photons, by a seed of its own, and their time on the device, ms.
+async fn simulate(
+    planner: &Planner<'_>,
+    request: &Value,
+    technique: &str,
+    [photons, seed]: [u64; 2],
+) -> Result<(Arc<Volume>, f64)> {
+    let mut request = request.clone();
+    let own = &mut request["volume"][technique];
+    (own["photons"], own["seed"]) = (json!(photons), json!(own["seed"].as_u64().unwrap_or(0) ^ seed));
+    request["budget"] = json!({"samples": 1});
+    let scene = planner.scene(&request)?;
+    let region = Region::some(1.0, [0, 0], scene.image());
+    let job = to_its_end(planner, request, scene.into_pilot(region)).await?;
+    let speed = job.resource().pointer("/result/photons_per_ms").and_then(Value::as_f64).unwrap_or(0.0);
+    let field = job.field().ok_or_else(|| Error::internal("a pilot without its field"))?;
+    Ok((field, photons as f64 / speed.max(f64::MIN_POSITIVE)))
 }
 
 impl Photons {
@@ -168,9 +172,9 @@ impl Photons {
         }
     }
 
-    /// How many there is time for.
+    /// How many there is time for, besides what any number takes.
     pub fn in_time(&self, ms: f64) -> u64 {
-        self.given.unwrap_or((((ms - self.ms[0]) / self.ms[1]) as u64).clamp(1, self.most))
+        self.given.unwrap_or(((ms / self.ms[1]) as u64).clamp(1, self.most))
     }
 
     /// What they cost, with the pictures on the way.
@@ -226,7 +230,7 @@ mod tests {
         assert_eq!(photons.needed(0.01), Some(144_000));
         assert_eq!((photons.needed(1e-4), photons.needed(0.0), photons.needed(-1.0)), (None, None, None));
         assert_eq!((rounded_up(123_456.0), rounded_up(99.2), rounded_up(3.0)), (124_000, 100, 3));
-        assert_eq!((photons.in_time(105.0), photons.in_time(-1.0)), (100_000, 1));
+        assert_eq!((photons.in_time(100.0), photons.in_time(-1.0)), (100_000, 1));
         let given = Photons { given: Some(200_000), ..photons };
         assert_eq!((given.needed(0.01), given.needed(0.001)), (Some(200_000), None));
     }

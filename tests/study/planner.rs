@@ -146,7 +146,8 @@ fn a_field_gets_the_photons_that_its_picture_needs_and_no_more() {
             request["volume"]["photon_transport"]["photons"] = json!(5000);
             let kept = plan(bench, &request);
             assert_eq!(kept.photons, Some(5000), "{name}: what is said is kept");
-            assert!(kept.samples < 1000 && kept.reasons[0].contains("comes nearest"), "{name}: {:?}", kept.reasons);
+            let nearest = kept.reasons.iter().any(|reason| reason.contains("comes nearest"));
+            assert!(kept.samples < 1000 && nearest, "{name}: {:?}", kept.reasons);
         }
     });
 }
