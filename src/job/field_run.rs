@@ -15,6 +15,8 @@ use crate::volume::Volume;
 
 /// Batches of equal size: enough for the standard errors of the ledger, and a power of two for the doublings.
 const BATCHES: u64 = 32;
+/// Pictures that are made while a field fills, each time the batches have doubled, besides the last.
+pub const PICTURES_ON_THE_WAY: u32 = BATCHES.ilog2();
 
 /// Histories of a work-item where items are many: enough that launching an item does not count.
 const HISTORIES_PER_ITEM: usize = 32;

@@ -34,6 +34,7 @@ use crate::scene::Scene;
 use crate::scene::camera::Camera;
 
 pub use engine::{Engine, Place, Readiness};
+pub use field_run::PICTURES_ON_THE_WAY;
 pub use report::{Counts, Frame, State, Timings, TracePoint, Update};
 
 /// Points of the convergence trace that are kept; past this, every second one is dropped.

@@ -131,28 +131,28 @@ impl Choice<'_> {
         Amount { samples: samples.unwrap_or(self.most), photons: Some(n) }
     }
 
-    /// What is enough, and in time.
-    fn enough(&self, p: &Pilot) -> Option<Amount> {
-        let in_time = |amount: &Amount| self.wish.time_ms.is_none_or(|t| self.cost(p, *amount) <= t);
-        self.for_error(p).filter(|amount| self.wish.says_error && in_time(amount))
-    }
-
     /// Chooses.
     pub fn choose(&self) -> Chosen {
         let Self { pilots, wish, .. } = *self;
-        let by_cost = |i: &usize| self.enough(&pilots[*i]).map_or(f64::INFINITY, |n| self.cost(&pilots[*i], n));
-        let by_error = |i: &usize| {
-            let p = &pilots[*i];
-            self.error(p, self.in_time(p).unwrap_or_else(|| self.nearest(p))) + p.bias_within
+        let for_error: Vec<Option<Amount>> = pilots.iter().map(|p| self.for_error(p)).collect();
+        let in_time = |p: &Pilot, n: &Amount| wish.time_ms.is_none_or(|t| self.cost(p, *n) <= t);
+        let each = || pilots.iter().zip(&for_error).enumerate();
+        let enough = least(each().filter_map(|(i, (p, n))| {
+            let n = n.filter(|n| wish.says_error && in_time(p, n))?;
+            Some((i, n, self.cost(p, n)))
+        }));
+        let nearest = || {
+            least(each().map(|(i, (p, _))| {
+                let n = self.in_time(p).unwrap_or_else(|| self.nearest(p));
+                (i, n, self.error(p, n) + p.bias_within)
+            }))
         };
-        let all = || 0..pilots.len();
-        let enough = all().filter(|i| by_cost(i).is_finite()).min_by(|a, b| by_cost(a).total_cmp(&by_cost(b)));
-        let index = enough.or_else(|| all().min_by(|a, b| by_error(a).total_cmp(&by_error(b)))).unwrap_or(0);
+        let none = (0, Amount { samples: self.most, photons: None });
+        let (index, amount) = enough.or_else(nearest).unwrap_or(none);
         let best = &pilots[index];
-        let amount = self.enough(best).or_else(|| self.in_time(best)).unwrap_or_else(|| self.nearest(best));
         let (time, error) = (self.cost(best, amount), self.error(best, amount));
-        let considered = pilots.iter().map(|p| {
-            let amount = if wish.says_error { self.for_error(p) } else { self.in_time(p) };
+        let considered = pilots.iter().zip(&for_error).map(|(p, for_error)| {
+            let amount = if wish.says_error { *for_error } else { self.in_time(p) };
             self.considered(p, amount.map(|n| (n, self.cost(p, n))))
         });
         Chosen {
@@ -168,6 +168,11 @@ impl Choice<'_> {
             considered: considered.collect(),
         }
     }
+}
+
+/// The setting, and how much of it, that has the least of something.
+fn least(all: impl Iterator<Item = (usize, Amount, f64)>) -> Option<(usize, Amount)> {
+    all.min_by(|a, b| a.2.total_cmp(&b.2)).map(|(i, n, _)| (i, n))
 }
 
 /// Parts of a squared error, or of a time, that a view may have where the rest is its field's.

@@ -29,6 +29,8 @@ const MOST: f64 = 0.25;
 pub struct Found {
     /// Of those that were run, the reference first.
     pub pilots: Vec<Pilot>,
+    /// The reference's runs, by two seeds.
+    pub reference: Option<[Run; 2]>,
     /// What the places in a pixel miss, of all of them.
     pub places: Places,
     /// The same as the reference's pilot saw it, which is of all of the picture.

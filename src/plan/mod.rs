@@ -52,7 +52,6 @@ const FEW: u32 = 8;
 struct Seen {
     /// As the reference shows it.
     scene: Scene,
-    reference: Candidate,
     simulated: Option<Simulated>,
     features: Features,
 }
@@ -93,7 +92,7 @@ impl Planner<'_> {
         let mut found = pilot::run_all(asked, &possible, useless).await?;
         seen.features.opaque = (family != Family::Scattering).then_some(found.opaque);
         let photons = match &seen.simulated {
-            Some(simulated) => Some(simulated.photons(asked, &seen.reference, seen.features.pixels_per_voxel).await?),
+            Some(simulated) => Some(simulated.photons(asked, &found, seen.features.pixels_per_voxel).await?),
             None => None,
         };
         let chosen = self.choose(asked, &mut found, wish, photons.as_ref()).await?;
@@ -162,7 +161,7 @@ impl Planner<'_> {
             (Subject::Field(_), None) => return Err(Error::internal("a field that was not simulated")),
         };
         let features = Features::of(&scene, volume, &reference.request(body));
-        Ok(Seen { scene, reference, simulated, features })
+        Ok(Seen { scene, simulated, features })
     }
 
     /// Measures what is to be known of this device, unless that is known.

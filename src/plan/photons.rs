@@ -13,11 +13,13 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::Planner;
 use super::candidates::Candidate;
+use super::found::Found;
 use super::noise::in_common;
 use super::pilot::{PIXELS, SAMPLES};
 use super::run::{Asked, Run, mean, to_its_end};
 use crate::error::{Error, Result};
 use crate::film::Round;
+use crate::job::PICTURES_ON_THE_WAY;
 use crate::scene::region::Region;
 use crate::technique::{self, Technique};
 use crate::volume::Volume;
@@ -28,8 +30,6 @@ const PILOT_MS: f64 = 60.0;
 /// How many of such fields there are, and how many times as many photons the last has.
 const FIELDS: usize = 8;
 const MANY: u64 = 8;
-/// Pictures that are made while the field fills, besides the last.
-const ON_THE_WAY: f64 = 5.0;
 /// Digits of a planned number of photons are kept but for this part of it.
 const ROUNDED: f64 = 0.01;
 /// Of more pixels than these it does not matter how many there are.
@@ -91,28 +91,26 @@ impl Simulated {
     ///
     /// # Errors
     /// Those of the request.
-    pub async fn photons(&self, asked: Asked<'_>, reference: &Candidate, pixels_per_voxel: f64) -> Result<Photons> {
-        let region = Region::some(PIXELS, [0, 0], asked.image);
-        let look = async |field: &Arc<Volume>| -> Result<(Run, [Arc<Round>; 2])> {
-            let [a, b] = Asked { field: Some(field), ..asked }.run_two(reference, region, SAMPLES).await?;
-            let last = |run: &Run| run.rounds().last().cloned();
-            let rounds = last(&a).zip(last(&b)).ok_or_else(|| Error::internal("a pilot without rounds"))?;
-            Ok((a, rounds.into()))
+    pub async fn photons(&self, asked: Asked<'_>, found: &Found, pixels_per_voxel: f64) -> Result<Photons> {
+        let (Some(pilot), Some(of_many)) = (found.pilots.first(), &found.reference) else {
+            return Err(Error::internal("a field that no pilot looked at"));
         };
-        let (run, [a, b]) = look(&self.many).await?;
-        let (mut apart, mut of_fields, mut ms) = (vec![0.0; run.pixels], Vec::new(), f64::INFINITY);
-        let request = reference.request(asked.body);
+        let region = Region::some(PIXELS, [0, 0], asked.image);
+        let [a, b] = last(of_many)?;
+        let (mut apart, mut of_fields, mut ms) = (vec![0.0; of_many[0].pixels], Vec::new(), f64::INFINITY);
+        let request = pilot.candidate.request(asked.body);
         for seed in 3..3 + FIELDS as u64 {
             // One at a time: they may be large.
             let (field, took) = simulate(asked.planner, &request, self.technique, [self.few, seed]).await?;
-            let (_, [c, d]) = look(&field).await?;
+            let looking = Asked { field: Some(&field), ..asked };
+            let [c, d] = last(&looking.run_two(&pilot.candidate, region, SAMPLES).await?)?;
             let products: Vec<f64> = in_common([&c, &a], [&d, &b]).collect();
             of_fields.push(mean(products.iter().copied()));
             apart.iter_mut().zip(products).for_each(|(sum, p)| *sum += p / FIELDS as f64);
             ms = ms.min(took);
         }
         let per_photon = 1.0 / self.few as f64 + 1.0 / self.photons as f64;
-        let squared = mean(apart.iter().copied()).max(0.0) / run.mean().powi(2) / per_photon;
+        let squared = mean(apart.iter().copied()).max(0.0) / pilot.scale.powi(2) / per_photon;
         // Pixels of one voxel are one.
         let alike = (pixels_per_voxel / f64::from(region.apart)).max(1.0).powi(2);
         Ok(Photons {
@@ -136,6 +134,12 @@ impl Simulated {
     pub fn with_photons(&self, request: &mut Value, photons: u64) {
         request["volume"][self.technique]["photons"] = json!(photons);
     }
+}
+
+/// What two runs came to.
+fn last([a, b]: &[Run; 2]) -> Result<[Arc<Round>; 2]> {
+    let rounds = a.rounds().last().cloned().zip(b.rounds().last().cloned());
+    rounds.map(Into::into).ok_or_else(|| Error::internal("a pilot without rounds"))
 }
 
 /// The field of a request with so many photons, by a seed of its own, and their time on the device, ms.
@@ -179,7 +183,7 @@ impl Photons {
 
     /// What they cost, with the pictures on the way.
     pub fn cost(&self, photons: u64, picture_ms: f64) -> f64 {
-        self.ms[0] + self.ms[1] * photons as f64 + ON_THE_WAY * picture_ms
+        self.ms[0] + self.ms[1] * photons as f64 + f64::from(PICTURES_ON_THE_WAY) * picture_ms
     }
 }
 

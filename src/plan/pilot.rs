@@ -89,7 +89,6 @@ pub fn chance(pixels: f64, numbers: f64) -> f64 {
 /// Those of the requests.
 pub async fn run_all(asked: Asked<'_>, candidates: &[Candidate], most: f64) -> Result<Found> {
     let region = Region::some(PIXELS, [0, 0], asked.image);
-    let mut references: Option<([Run; 2], f64)> = None;
     let mut found = Found::default();
     let mut too_much: Vec<&str> = Vec::new();
     for candidate in candidates {
@@ -99,9 +98,9 @@ pub async fn run_all(asked: Asked<'_>, candidates: &[Candidate], most: f64) -> R
             continue;
         }
         let runs = asked.run_two(candidate, region, SAMPLES).await?;
-        let scale = references.as_ref().map_or_else(|| runs[0].mean(), |r| r.1);
-        let (bias, bias_within) = match &references {
-            Some(([a, b], _)) if !candidate.unbiased => {
+        let scale = found.pilots.first().map_or_else(|| runs[0].mean(), |reference| reference.scale);
+        let (bias, bias_within) = match &found.reference {
+            Some([a, b]) if !candidate.unbiased => {
                 let apart = |run: &Run, other: &Run, i: usize| (run.luminance(i) - other.luminance(i)) / scale;
                 lasting((0..a.pixels).map(|i| apart(&runs[0], a, i) * apart(&runs[1], b, i)).collect())
             }
@@ -112,7 +111,7 @@ pub async fn run_all(asked: Asked<'_>, candidates: &[Candidate], most: f64) -> R
         }
         let [a, b] = [runs[0].rounds(), runs[1].rounds()];
         let (random, seen) = random(a, b, scale);
-        if references.is_none() {
+        if found.reference.is_none() {
             found.matter = runs[0].film.random_noise().1;
             found.places = Places::by_two(a, b, scale, deviation(found.matter));
             found.everywhere = found.places.clone();
@@ -129,7 +128,7 @@ pub async fn run_all(asked: Asked<'_>, candidates: &[Candidate], most: f64) -> R
             ms_per_sample: runs[0].ms[1].min(runs[1].ms[1]) / runs[0].pixels as f64,
             whole: None,
         });
-        references.get_or_insert((runs, scale));
+        found.reference.get_or_insert(runs);
     }
     if found.pilots.is_empty() { Err(Error::internal("no candidate is possible")) } else { Ok(found) }
 }

@@ -28,12 +28,12 @@ pub struct Outcome {
     pub asked: f64,
     /// What was rendered: technique, options, samples.
     pub planned: String,
-    /// The error of that picture.
-    pub true_error: f64,
+    /// The error of that picture; none of a plan that says itself that nothing is within the error, which is not run.
+    pub true_error: Option<f64>,
     /// Device times.
     pub predicted_ms: f64,
-    /// See `predicted_ms`.
-    pub measured_ms: f64,
+    /// See `predicted_ms` and `true_error`.
+    pub measured_ms: Option<f64>,
     /// The cheapest setting that would have done, and its time; none where none that was tried does.
     pub cheapest: Option<String>,
     /// See `cheapest`.
@@ -52,19 +52,20 @@ pub struct Planned {
 impl Outcome {
     /// The true error is at most the one asked for.
     pub fn is_met(&self) -> bool {
-        self.true_error <= self.asked
+        self.true_error.is_some_and(|error| error <= self.asked)
     }
 
     /// The device took about as long as predicted.
     pub fn is_in_time(&self) -> bool {
-        let ratio = self.measured_ms / self.predicted_ms;
-        (1.0 / TIME_FACTOR..=TIME_FACTOR).contains(&ratio)
+        let ratio = self.measured_ms.map(|ms| ms / self.predicted_ms);
+        ratio.is_some_and(|ratio| (1.0 / TIME_FACTOR..=TIME_FACTOR).contains(&ratio))
     }
 
     /// It cost about as little as it could.
     pub fn is_cheap(&self) -> bool {
         // Where no setting that was tried by force is enough, a plan that is has found the cheapest.
-        self.cheapest_ms.map_or(self.is_met(), |least| self.measured_ms <= COST_FACTOR * least)
+        let within = |(least, ms): (f64, f64)| ms <= COST_FACTOR * least;
+        self.cheapest_ms.zip(self.measured_ms).map_or(self.is_met(), within)
     }
 }
 
@@ -96,13 +97,13 @@ impl Planned {
         for s in &self.scenes {
             let mark = |kept: bool| if kept { "" } else { " **!**" };
             text += &format!(
-                "| {} | {:.2} % | {:.2} %{} | {:.1} ms | {:.1} ms{} | {}{} | {} |\n",
+                "| {} | {:.2} % | {}{} | {:.1} ms | {}{} | {}{} | {} |\n",
                 s.scene,
                 100.0 * s.asked,
-                100.0 * s.true_error,
+                s.true_error.map_or("–".into(), |error| format!("{:.2} %", 100.0 * error)),
                 mark(s.is_met()),
                 s.predicted_ms,
-                s.measured_ms,
+                s.measured_ms.map_or("–".into(), |ms| format!("{ms:.1} ms")),
                 mark(s.is_in_time()),
                 s.cheapest_ms
                     .map_or("–".into(), |ms| format!("{ms:.1} ms ({})", s.cheapest.as_deref().unwrap_or_default())),
@@ -132,7 +133,7 @@ pub fn planner(bench: &Bench, scenes: Range<u64>, told: &mut dyn FnMut(&str)) ->
     for seed in scenes {
         let found = outcome(bench, seed, &scene(seed))?;
         told(&format!(
-            "planner, scene {seed}: asked {:.3}, is {:.4}; {:.1} ms for {:.1} predicted, cheapest {:.1?}; {}",
+            "planner, scene {seed}: asked {:.3}, is {:.4?}; {:.1?} ms for {:.1} predicted, cheapest {:.1?}; {}",
             found.asked, found.true_error, found.measured_ms, found.predicted_ms, found.cheapest_ms, found.planned
         ));
         outcomes.push(found);
@@ -187,9 +188,9 @@ fn not_enough(scene: u64, request: &Value, asked: f64, plan: &Plan) -> Outcome {
             "not run, as nothing that is permitted is enough: {}",
             words(request, plan, plan.samples.into())
         ),
-        true_error: plan.error.value.max(asked.next_up()),
+        true_error: None,
         predicted_ms: plan.device_ms.value,
-        measured_ms: 0.0,
+        measured_ms: None,
         cheapest: None,
         cheapest_ms: None,
     }
@@ -224,9 +225,9 @@ fn outcome(bench: &Bench, scene: u64, request: &Value) -> Result<Outcome> {
         request: request.clone(),
         asked,
         planned: words(request, &plan, run.samples),
-        true_error,
+        true_error: Some(true_error),
         predicted_ms: plan.device_ms.value,
-        measured_ms,
+        measured_ms: Some(measured_ms),
         cheapest: cheapest.as_ref().map(|c| c.1.clone()),
         cheapest_ms: cheapest.map(|c| c.0),
     })
