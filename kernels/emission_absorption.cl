@@ -35,28 +35,118 @@ static inline Optical optical(Entry e) {
     return o;
 }
 
-// Where the table has a raw value in units of `unit`.
-static inline Int index_of(constant const EmissionAbsorption *params, Real raw, float unit) {
-    Real x = mad(raw, (Real)(params->table_scale * unit), (Real)(params->table_offset));
-    return to_int(clamp(x, (Real)(0.0f), (Real)(TABLE_SIZE - 1)));
+// Where a raw value in units of `unit` is in the table: entry i is at i. NaN where the value is.
+static inline Real place_of(constant const EmissionAbsorption *params, Real raw, float unit) {
+    Real x = mad(raw, (Real)(params->table_scale * unit), (Real)(params->table_offset - 0.5f));
+    Real place = clamp(x, (Real)(0.0f), (Real)(TABLE_SIZE - 1));
+#if VOXEL == VOXEL_F32
+    place = select(place, raw, MASK(raw != raw));
+#endif
+    return place;
 }
 
-// The transfer function at a raw value in units of `unit`, with the opacity of a whole step; a NaN is empty.
-static inline Optical classify(constant const EmissionAbsorption *params, global const uchar *table, Real raw, float unit) {
-#if VOXEL == VOXEL_F32
-    Mask nan = MASK(raw != raw);
-    Optical o = optical(entry_at(table, index_of(params, select(raw, (Real)(0.0f), nan), unit)));
-    o.alpha = select(o.alpha, (Real)(0.0f), nan);
-    return o;
+// What follows the table of a function that is smooth but for some kinks: where its pieces begin, up to where each has no opacity,
+// and their polynomials, a cubic for the opacity and a line for each colour (src/technique/emission_absorption/pieces.rs).
+#define PIECES 16
+typedef struct { float start[PIECES], empty[PIECES], opacity[4][PIECES], colour[3][2][PIECES]; } Pieces;
+
+#define PIECES_OF(table) ((global const Pieces *)((table) + 8 * TABLE_SIZE))
+
+// The piece that a place is on; -1 where there are none.
+static inline int piece_at(global const Pieces *t, float place) {
+#if LANES == 16
+    return count_lanes(MASK((Real)(place) >= *(global const Real *)t->start)) - 1;
 #else
-    return optical(entry_at(table, index_of(params, raw, unit)));
+    int piece = -1;
+    while (piece < PIECES - 1 && place >= t->start[piece + 1]) piece++;
+    return piece;
 #endif
 }
 
+// The pieces that a set of samples lies on.
+typedef struct { int first, last; bool empty; } Span;
+
+static inline Span span_of(global const uchar *table, float least, float greatest) {
+    global const Pieces *t = PIECES_OF(table);
+    Span s;
+    s.first = piece_at(t, least), s.last = piece_at(t, greatest);
+    s.empty = !(least <= greatest) || (s.first >= 0 && s.first == s.last && greatest <= t->empty[s.first]);
+    return s;
+}
+
+#define ON_TABLE 0
+#define ON_PIECE 1
+#define ON_PIECES 2
+
+static inline int form_of(Span s) { return s.first < 0 ? ON_TABLE : s.first == s.last ? ON_PIECE : ON_PIECES; }
+
+#define POLYNOMIALS(PART)                                                                                                   \
+    Real x = place - PART(t->start);                                                                                        \
+    Real alpha = mad(mad(mad(PART(t->opacity[3]), x, PART(t->opacity[2])), x, PART(t->opacity[1])), x, PART(t->opacity[0])); \
+    o.alpha = LESSER(alpha, (Real)(1.0f));                                                                                  \
+    o.colour = real3(mad(PART(t->colour[0][1]), x, PART(t->colour[0][0])), mad(PART(t->colour[1][1]), x, PART(t->colour[1][0])), \
+                     mad(PART(t->colour[2][1]), x, PART(t->colour[2][0])));
+
+// The transfer function where all lanes are on one piece.
+static inline Optical on_piece(global const Pieces *t, int piece, Real place) {
+    Optical o;
+    #define PART(column) (Real)((column)[piece])
+    POLYNOMIALS(PART)
+    #undef PART
+    return o;
+}
+
+// The same where they are on several.
+static inline Optical on_pieces(global const Pieces *t, Span s, Real place) {
+#if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_permvarsf512)
+    Int piece = (Int)(s.first);
+    for (int i = s.first + 1; i <= s.last; i++) piece -= MASK(place >= t->start[i]);
+    Optical o;
+    #define PART(column) __builtin_ia32_permvarsf512(*(global const Real *)(column), piece)
+    POLYNOMIALS(PART)
+    #undef PART
+#else
+    Optical o = on_piece(t, s.first, place);
+    for (int i = s.first + 1; i <= s.last; i++) {
+        Mask there = MASK(place >= t->start[i]);
+        Optical next = on_piece(t, i, place);
+        o.alpha = select(o.alpha, next.alpha, there), o.colour = select3(o.colour, next.colour, there);
+    }
+#endif
+    return o;
+}
+
+// The transfer function at places in the table, with the opacity of a whole step; a NaN is empty.
+static inline Optical optical_at(global const uchar *table, Span s, int form, Real place) {
+    Optical o;
+    if (form == ON_PIECE) o = on_piece(PIECES_OF(table), s.first, place);
+    else if (form == ON_PIECES) o = on_pieces(PIECES_OF(table), s, place);
+    else o = optical(entry_at(table, to_int(fmax(place, (Real)(0.0f)) + 0.5f)));
+#if VOXEL == VOXEL_F32
+    o.alpha = select(o.alpha, (Real)(0.0f), MASK(place != place));
+#endif
+#if DECODED_EACH
+    o.colour = decoded(o.colour, (Real)(1.0f));
+#endif
+    return o;
+}
+
+// The same at a raw value in units of `unit`.
+static inline Optical classify(constant const EmissionAbsorption *params, global const uchar *table, Real raw, float unit) {
+    Real place = place_of(params, raw, unit);
+#if VOXEL == VOXEL_F32
+    Mask nan = MASK(place != place);
+    Span s = span_of(table, least_lane(select(place, (Real)(INFINITY), nan)), greatest_lane(select(place, (Real)(-INFINITY), nan)));
+#else
+    Span s = span_of(table, least_lane(place), greatest_lane(place));
+#endif
+    return optical_at(table, s, form_of(s), place);
+}
+
 #if SHADED
-// The colour of a sample of gradient g, in index units, under the lights.
-static inline Real3 lit(constant const View *view, const Packet *p, Real3 g, Real3 colour) {
-    return shade(view, gradient_world(view, g), p->half_way, decoded(colour, (Real)(1.0f)));
+// The colour of a sample of gradient g, in `unit` a voxel, under the lights.
+static inline Real3 lit(constant const View *view, const Packet *p, Real3 g, float unit, Real3 colour) {
+    return shade(view, gradient_world(view, g), unit, p->half_way, colour);
 }
 #endif
 
@@ -85,6 +175,7 @@ static inline Optical classify_2d(constant const EmissionAbsorption *params, glo
     Real g = clamp(mad(magnitude, (Real)(params->gradient_scale), (Real)(0.5f)), (Real)(0.0f), (Real)(255.0f));
     Optical o = optical(entry_at(table, to_int(select(v, (Real)(0.0f), nan)) + (to_int(select(g, (Real)(0.0f), nan)) << 8)));
     o.alpha = select(o.alpha, (Real)(0.0f), nan);
+    o.colour = decoded(o.colour, (Real)(1.0f));
     return o;
 }
 
@@ -99,7 +190,7 @@ static inline void styled_step(constant const View *view, constant const Emissio
     Real factor = extinction_factor(params, &s) * (length / view->step);
     o.alpha = select((Real)(0.0f), opacity_times(o.alpha, factor), inside & MASK(factor == factor));
     if (!any_lane(MASK(o.alpha > 0.0f))) return;
-    o.colour = styled_colour(view, params, &s, decoded(o.colour, (Real)(1.0f)));
+    o.colour = styled_colour(view, params, &s, o.colour);
     composite(params, o, r);
 }
 #endif
@@ -153,44 +244,60 @@ static inline void preintegrated_step(constant const View *view, constant const 
     o.colour = real3(between(table, 1, a, b, close) * inverse, between(table, 2, a, b, close) * inverse, between(table, 3, a, b, close) * inverse);
 #if SHADED
     Real3 at = along(p->ray.origin, p->ray.direction, 0.5f * (from + to));
-    o.colour = shade(view, gradient_world(view, gradient_raw(view, voxels, at)), p->half_way, o.colour);
+    o.colour = shade(view, gradient_world(view, gradient_raw(view, voxels, at)), 1.0f, p->half_way, o.colour);
 #endif
     composite(params, o, r);
 }
 #endif
 
-#if defined(NARROW) && !SHADED
-// The steps from k to end - 1 of lanes that are close together, at most STRIDE of them: first where each is in the table, then what
-// is there. Of two short loops the processor has several steps under way at once; of a long one it sees no further than about a step.
-static inline void narrow_steps(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
-                                global const uchar *table, const Packet *p, int k, int end, Radiance *r) {
-    Int index[STRIDE];
-    for (int i = 0; i < end - k; i++) {
-        float at = (float)(k + i);
-        Real raw = narrow_raw(view, voxels, along(p->start, p->pace, (Real)(at)), convert_int4(p->low + p->low_pace * at));
-        index[i] = index_of(params, raw, INNER_UNIT);
-    }
-    for (int i = 0; i < end - k; i++) composite(params, optical(entry_at(table, index[i])), r);
-}
+// Whether samples are taken a stride at a time. Of lit ones that are far apart value and gradient come by the same gathers.
+#if LANES == 1 || BACK_TO_FRONT || STYLED || PREINTEGRATED
+#define IN_STRIDES 0
+#elif !SHADED
+#define IN_STRIDES 1
+#define STRIDES_END inner_end
 #elif defined(NARROW)
-// The same of lit samples, as a pipeline: while a step's voxels are on their way, those of the one before are interpolated, and the
-// one before that is lit and composited.
-static inline void narrow_steps(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
-                                global const uchar *table, const Packet *p, int k, int end, Radiance *r) {
-    WideBlock block = wide_block_at(view, voxels, convert_int4(p->low + p->low_pace * (float)k));
-    Optical before = {{(Real)(0.0f), (Real)(0.0f), (Real)(0.0f)}, (Real)(0.0f)};
-    Real3 gradient = before.colour;
-    for (float at = (float)k; k < end; k++, at += 1.0f) {
-        WideBlock next = wide_block_at(view, voxels, convert_int4(p->low + p->low_pace * fmin(at + 1.0f, (float)(end - 1))));
-        Real3 place = along(p->start, p->pace, (Real)(at)), steep = gradient;
-        Optical o = classify(params, table, wide_raw(&block, place), INNER_UNIT);
-        if (any_lane(MASK(o.alpha > 0.0f))) steep = wide_gradient(&block, place);
-        if (any_lane(MASK(before.alpha > 0.0f))) before.colour = lit(view, p, scale3(gradient, (Real)(INNER_UNIT)), before.colour);
-        composite(params, before, r);
-        before = o, gradient = steep, block = next;
+#define IN_STRIDES 1
+#define STRIDES_END narrow_end
+#else
+#define IN_STRIDES 0
+#endif
+
+#if IN_STRIDES
+// What is seen at the steps from k to end - 1, of which the places in the table are known.
+static inline void see(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels, global const uchar *table,
+                       const Packet *p, int k, int end, Span span, int form, const Real *place, Radiance *r) {
+#if SHADED
+    BlockPlaces places = block_places(view, p->low + p->low_pace * (float)k, p->low_pace);
+    Fixed3 at = fixed3(along(p->start, p->pace, (Real)((float)k))), pace = fixed3_nearest(p->pace), here;
+#endif
+    for (int i = 0; i < end - k; i++) {
+        Optical o = optical_at(table, span, form, place[i]);
+#if SHADED
+        here = at, at = add_fixed3(at, pace);
+        if (!any_lane(MASK(o.alpha > 0.0f))) continue;
+        o.colour = lit(view, p, narrow_gradient(view, voxels, &places, i, inner_of(here)), GRADIENT_UNIT, o.colour);
+#endif
+        composite(params, o, r);
     }
-    before.colour = lit(view, p, scale3(gradient, (Real)(INNER_UNIT)), before.colour);
-    composite(params, before, r);
+}
+
+// The steps from k to end - 1, at most STRIDE, all of them whole: first the values, then what is seen of them. Of two short loops the
+// processor has several steps under way at once; of a long one it sees no further than about a step.
+static inline void whole_steps(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
+                               global const uchar *table, const Packet *p, int k, int end, Radiance *r) {
+    Real place[STRIDE], low = (Real)(INFINITY), high = (Real)(-INFINITY);
+    whole_steps_raw(view, voxels, p, k, end, place);
+    for (int i = 0; i < end - k; i++) {
+        place[i] = place_of(params, place[i], INNER_UNIT);
+        low = LESSER(place[i], low), high = GREATER(place[i], high);
+    }
+    Span s = span_of(table, least_lane(low), greatest_lane(high));
+    if (s.empty) return;
+    int form = form_of(s);
+    if (form == ON_PIECE) see(view, params, voxels, table, p, k, end, s, ON_PIECE, place, r);
+    else if (form == ON_PIECES) see(view, params, voxels, table, p, k, end, s, ON_PIECES, place, r);
+    else see(view, params, voxels, table, p, k, end, s, ON_TABLE, place, r);
 }
 #endif
 
@@ -202,7 +309,7 @@ static inline void inner_step(constant const View *view, constant const Emission
     Real3 g;
     Optical o = classify(params, table, inner_gradient(view, voxels, at, &g), INNER_UNIT);
     if (!any_lane(MASK(o.alpha > 0.0f))) return;
-    o.colour = lit(view, p, scale3(g, (Real)(INNER_UNIT)), o.colour);
+    o.colour = lit(view, p, g, GRADIENT_UNIT, o.colour);
 #else
     Optical o = classify(params, table, inner_raw(view, voxels, at), INNER_UNIT);
 #endif
@@ -221,7 +328,7 @@ static inline void edge_step(constant const View *view, constant const EmissionA
     o.alpha = select((Real)(0.0f), select(part, o.alpha, MASK(length >= view->step)), inside);
     if (!any_lane(MASK(o.alpha > 0.0f))) return;
 #if SHADED
-    o.colour = lit(view, p, gradient_raw(view, voxels, at), o.colour);
+    o.colour = lit(view, p, gradient_raw(view, voxels, at), 1.0f, o.colour);
 #endif
     composite(params, o, r);
 }
@@ -236,10 +343,10 @@ static inline void march(constant const View *view, constant const EmissionAbsor
     for (; k < end; k++) styled_step(view, params, voxels, table, p, k, &r);
 #endif
     while (k < end) {
-#ifdef NARROW
-        if (k >= p->inner && k < p->narrow_end) {
-            int to = min(end, p->narrow_end);
-            narrow_steps(view, params, voxels, table, p, k, to, &r);
+#if IN_STRIDES
+        if (k >= p->inner && k < p->STRIDES_END) {
+            int to = min(end, p->STRIDES_END);
+            whole_steps(view, params, voxels, table, p, k, to, &r);
             k = to;
             continue;
         }

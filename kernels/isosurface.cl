@@ -64,7 +64,7 @@ static inline Real3 surface_colour(constant const View *view, constant const Iso
     Real3 gradient = gradient_world(view, surface_gradient(view, voxels, params->analytic, at, found));
     Real3 half_way[MAX_LIGHTS];
     half_ways(view, ray, half_way);
-    Real3 lit = shade(view, gradient, half_way, colour);
+    Real3 lit = shade(view, gradient, 1.0f, half_way, colour);
     if (params->occlusion_rays > 0) {
         Real hidden = view->ambient * occlusion(view, params, voxels, p, b, at, ray, gradient, found);
         lit = real3(mad(-hidden, colour.x, lit.x), mad(-hidden, colour.y, lit.y), mad(-hidden, colour.z, lit.z));

@@ -71,20 +71,22 @@ static inline float part_bound(constant const View *view, constant const Project
 // The steps first..last-1 of one packet, in the lanes that take a sample there.
 static inline void take_steps(constant const View *view, constant const Projection *params, VOLUME voxels, const Packet *p, int first,
                               int last, Real *best) {
-    for (int k = first; k < last; k++) {
-        Real v;
-        Mask inside;
+    for (int k = first; k < last;) {
         if (k >= p->inner && k < p->inner_end) {
-            v = params->sign * whole_step_raw(view, voxels, p, k);
-            inside = MASK(v > *best);
+            Real raw[STRIDE];
+            int to = min(min(last, p->inner_end), k + STRIDE);
+            whole_steps_raw(view, voxels, p, k, to, raw);
+            for (int i = 0; i < to - k; i++) *best = GREATER(params->sign * INNER_UNIT * raw[i], *best);
+            k = to;
         } else {
             Real t, length;
-            inside = edge_sample(view, p, k, &t, &length);
-            if (!any_lane(inside)) continue;
-            v = params->sign * sample_raw(view, voxels, along(p->ray.origin, p->ray.direction, t));
-            inside &= MASK(v > *best);
+            Mask inside = edge_sample(view, p, k, &t, &length);
+            if (any_lane(inside)) {
+                Real v = params->sign * sample_raw(view, voxels, along(p->ray.origin, p->ray.direction, t));
+                *best = select(*best, v, inside & MASK(v > *best));
+            }
+            k++;
         }
-        *best = select(*best, v, inside);
     }
 }
 #endif

@@ -13,55 +13,85 @@ static inline int4 load_rows(global const uchar *from, int row) {
     return (int4)(INT_AT(from), INT_AT(from + row), INT_AT(from + 2 * row), INT_AT(from + 3 * row));
 }
 
-// The block of voxels for a step: `first` is its lowest corner.
-typedef struct { Int rows; int4 first; } Block;
+#if SHADED
+// Voxels that are read before and after the block, and the fewest a side that this leaves room for.
+#define AROUND 1
+#define NARROW_LEAST 6
+#else
+#define AROUND 0
+#define NARROW_LEAST 4
+#endif
 
-// At most the lanes' least place in whole voxels.
-static inline Block block_at(constant const View *view, VOLUME voxels, int4 first) {
+// Where the blocks of eight steps are: the offset of the lowest corner, and what leads from a voxel's numbers to its row in the
+// block (z * 4 + y), to its bytes in the row, and to its word in a field (z * 16 + y * 4 + x).
+typedef struct { uint offset[8]; int rows[8], bytes[8], words[8]; } BlockPlaces;
+
+// `low` is the lanes' least place of the first step in voxels, `pace` its way to the next.
+static inline BlockPlaces block_places(constant const View *view, float4 low, float4 pace) {
+    float8 k = (float8)(0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f);
+    #define FIRST(c, i) max(min(convert_int8(low.c + pace.c * k), view->dims[i] - 4 - AROUND), AROUND)
+    int8 x = FIRST(x, 0), y = FIRST(y, 1), z = FIRST(z, 2);
+    #undef FIRST
+    BlockPlaces c;
+    vstore8((as_uint8(z) * (uint)view->dims[1] + as_uint8(y)) * (uint)view->dims[0] + as_uint8(x), 0, c.offset);
+    vstore8(-(z * 4 + y), 0, c.rows);
+    vstore8(x * -0x10001, 0, c.bytes);
+    vstore8(-(z * 16 + y * 4 + x), 0, c.words);
+    return c;
+}
+
+// The block of voxels for a step.
+typedef struct { Int voxels, rows, bytes; } Block;
+
+static inline Block block_from(constant const View *view, global const uchar *from, int rows, int bytes) {
     int row = view->dims[0], sheet = view->dims[0] * view->dims[1];
     Block b;
-    b.first = min(first, (int4)(row, view->dims[1], view->dims[2], 4) - 4);
-    global const uchar *from = voxels + ((size_t)b.first.z * sheet + b.first.y * row + b.first.x);
-    b.rows = (Int)(load_rows(from, row), load_rows(from + sheet, row), load_rows(from + 2 * sheet, row), load_rows(from + 3 * sheet, row));
+    b.voxels = (Int)(load_rows(from, row), load_rows(from + sheet, row), load_rows(from + 2 * sheet, row), load_rows(from + 3 * sheet, row));
+    b.rows = (Int)(rows), b.bytes = (Int)(bytes);
     return b;
 }
 
-static inline Real block_raw(const Block *block, Real3 p) {
-    Inner i = inner_at(p);
-    Int at = (i.z << 2) + i.y - (block->first.z * 4 + block->first.y);
-    Int order = __builtin_astype(BOTH(i.x), Int) + (PAIR_ORDER - block->first.x * 0x10001);
-    #define LINE(n) to_real(MULTIPLY_ADD(SHUFFLE(__builtin_ia32_permvarsi512(block->rows, at + (n)), order), i.weights))
-    Real a = LINE(0), b = LINE(1), c = LINE(4), d = LINE(5);
-    #undef LINE
-    Real near = LERP(a, c, i.fz), far = LERP(b, d, i.fz);
-    return LERP(near, far, i.fy);
+static inline Block block_at(constant const View *view, VOLUME voxels, const BlockPlaces *c, int i) {
+    return block_from(view, voxels + c->offset[i], c->rows[i], c->bytes[i]);
 }
 
-static inline Real narrow_raw(constant const View *view, VOLUME voxels, Real3 p, int4 first) {
-    Block b = block_at(view, voxels, first);
-    return block_raw(&b, p);
+static inline Real block_raw(const Block *block, Inner i) {
+    Int at = (i.z << 2) + i.y + block->rows;
+    Int order = __builtin_astype(BOTH(i.x), Int) + (PAIR_ORDER + block->bytes);
+    #define PAIR(n, weights) MULTIPLY_ADD(SHUFFLE(__builtin_ia32_permvarsi512(block->voxels, at + (n)), order), weights)
+    return to_real((PAIR(0, i.near) + PAIR(1, i.next)) + (PAIR(4, i.far) + PAIR(5, i.beyond)));
+    #undef PAIR
 }
 
-// The same block with what is around it, for gradients: its rows from a voxel before to three after, two registers of eight, and
-// four rows each beside it: before and after in y for each z, before and after in z for each y.
-typedef struct { long8 low, high; Int beside; int4 first; } WideBlock;
+// The same of a single step, whose least place is `low`.
+static inline Real narrow_raw(constant const View *view, VOLUME voxels, Real3 p, float4 low) {
+    int4 first = min(convert_int4(low), (int4)(view->dims[0], view->dims[1], view->dims[2], 4) - 4);
+    size_t offset = ((size_t)first.z * view->dims[1] + first.y) * view->dims[0] + first.x;
+    Block block = block_from(view, voxels + offset, -(first.z * 4 + first.y), first.x * -0x10001);
+    return block_raw(&block, inner_at(p));
+}
 
-// The fewest voxels a side that a wide block fits in.
-#define WIDE_LEAST 6
+#if SHADED
+// For gradients the block with what is around it: its rows from a voxel before to three after, two registers of eight, and four rows
+// each beside it: before and after in y for each z, before and after in z for each y.
+typedef struct { long8 low, high; Int beside; } WideBlock;
 
 static inline long4 load_wide_rows(global const uchar *from, int row) {
     return (long4)(LONG_AT(from), LONG_AT(from + row), LONG_AT(from + 2 * row), LONG_AT(from + 3 * row));
 }
 
-static inline WideBlock wide_block_at(constant const View *view, VOLUME voxels, int4 first) {
+static inline WideBlock wide_block_at(constant const View *view, global const uchar *from) {
     int row = view->dims[0], sheet = view->dims[0] * view->dims[1];
     WideBlock b;
-    b.first = max(min(first, (int4)(row, view->dims[1], view->dims[2], 6) - 5), (int4)(1));
-    global const uchar *from = voxels + ((size_t)b.first.z * sheet + b.first.y * row + b.first.x);
     b.low = (long8)(load_wide_rows(from - 1, row), load_wide_rows(from - 1 + sheet, row));
     b.high = (long8)(load_wide_rows(from - 1 + 2 * sheet, row), load_wide_rows(from - 1 + 3 * sheet, row));
     b.beside = (Int)(load_rows(from - row, sheet), load_rows(from + 4 * row, sheet), load_rows(from - sheet, row), load_rows(from + 4 * sheet, row));
     return b;
+}
+
+// The rows from x voxels beside the block's lowest corner on.
+static inline Int wide_rows(const WideBlock *b, int x) {
+    return (Int)(as_int16(b->low >> (8 * x + 8)).even, as_int16(b->high >> (8 * x + 8)).even);
 }
 
 typedef uchar Row32 __attribute__((ext_vector_type(32)));
@@ -75,36 +105,25 @@ static inline Field field_of(Int after, Int before) {
     return f;
 }
 
-// The field between its voxels; `order` names the pair of words at a lane's lowest corner.
-static inline Real field_between(Field f, Int order, const Inner *i) {
-    #define LINE(n) to_real(MULTIPLY_ADD(__builtin_ia32_vpermi2varhi512(f.low, AS_WORDS(order + (n) * 0x10001), f.high), i->weights))
-    Real a = LINE(0), b = LINE(4), c = LINE(16), d = LINE(20);
-    #undef LINE
-    Real near = LERP(a, c, i->fz), far = LERP(b, d, i->fz);
-    return LERP(near, far, i->fy);
+// The field between its voxels; `pair` is the words of a lane's lowest corner and the next in x.
+static inline Real field_between(Field f, Int pair, const Inner *i) {
+    #define PAIR(n, weights) MULTIPLY_ADD(__builtin_ia32_vpermi2varhi512(f.low, AS_WORDS(pair + (n) * 0x10001), f.high), weights)
+    return to_real((PAIR(0, i->near) + PAIR(4, i->next)) + (PAIR(16, i->far) + PAIR(20, i->beyond)));
+    #undef PAIR
 }
 
-// The rows from x voxels beside the block's lowest corner on.
-static inline Int wide_rows(const WideBlock *b, int x) {
-    return (Int)(as_int16(b->low >> (8 * x + 8)).even, as_int16(b->high >> (8 * x + 8)).even);
-}
-
-static inline Real wide_raw(const WideBlock *b, Real3 p) {
-    Block block = {wide_rows(b, 0), b->first};
-    return block_raw(&block, p);
-}
-
-// The gradient by central differences, in units of INNER_UNIT a voxel: the differences at the block's voxels are worked out once for
-// all lanes, and what lies between them is interpolated for each.
-static inline Real3 wide_gradient(const WideBlock *b, Real3 p) {
-    Inner i = inner_at(p);
-    Int at = (i.z << 4) + (i.y << 2) + i.x - (b->first.z * 16 + b->first.y * 4 + b->first.x);
-    Int order = (at | (at << 16)) + 0x10000, rows = wide_rows(b, 0);
-    #define MOVED(...) __builtin_shufflevector(rows, b->beside, __VA_ARGS__)
-    Field x = field_of(wide_rows(b, 1), wide_rows(b, -1));
+// The gradient by central differences in step k of eight: the differences at the block's voxels are worked out once for all lanes, and
+// what lies between them is interpolated for each.
+static inline Real3 narrow_gradient(constant const View *view, VOLUME voxels, const BlockPlaces *places, int k, Inner i) {
+    WideBlock b = wide_block_at(view, voxels + places->offset[k]);
+    Int word = (i.z << 4) + (i.y << 2) + i.x + places->words[k], pair = (word | (word << 16)) + 0x10000;
+    Int rows = wide_rows(&b, 0);
+    #define MOVED(...) __builtin_shufflevector(rows, b.beside, __VA_ARGS__)
+    Field x = field_of(wide_rows(&b, 1), wide_rows(&b, -1));
     Field y = field_of(MOVED(1, 2, 3, 20, 5, 6, 7, 21, 9, 10, 11, 22, 13, 14, 15, 23), MOVED(16, 0, 1, 2, 17, 4, 5, 6, 18, 8, 9, 10, 19, 12, 13, 14));
     Field z = field_of(MOVED(4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 28, 29, 30, 31), MOVED(24, 25, 26, 27, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11));
     #undef MOVED
-    return scale3(real3(field_between(x, order, &i), field_between(y, order, &i), field_between(z, order, &i)), (Real)(0.5f));
+    return real3(field_between(x, pair, &i), field_between(y, pair, &i), field_between(z, pair, &i));
 }
+#endif
 #endif

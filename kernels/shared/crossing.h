@@ -68,7 +68,7 @@ static inline Real3 surface_gradient(constant const View *view, VOLUME voxels, i
     if (!any_lane(on & ~inner)) {
         Real3 g, middle = real3((Real)(0.5f * view->dims[0]), (Real)(0.5f * view->dims[1]), (Real)(0.5f * view->dims[2]));
         inner_gradient(view, voxels, inner_place(select3(middle, at, on)), &g);
-        return scale3(g, (Real)(INNER_UNIT));
+        return scale3(g, (Real)(GRADIENT_UNIT));
     }
 #endif
     return gradient_raw(view, voxels, at);

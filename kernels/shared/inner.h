@@ -1,19 +1,20 @@
 // Samples of packets whose lanes are all at least INNER_MARGIN voxels away from the box's faces: no clamps. A place is
-// given by inner_place, and values are in units of INNER_UNIT. Bytes are weighed along x in whole numbers, with weights of 15
-// bits: exact to 2^-15 of their difference, and the same to the last bit for any number of lanes.
+// given by inner_place, and values are in units of INNER_UNIT. Bytes are weighed in whole numbers, with weights of 15 bits that add
+// up to all of it: exact to some 2^-15 of their differences, and the same to the last bit for any number of lanes.
 #define INNER_MARGIN 1.51f
+// A gradient by central differences comes in units of this a voxel.
+#define GRADIENT_UNIT (0.5f * INNER_UNIT)
 
 #if INTERPOLATION == TRILINEAR && VOXEL == VOXEL_U8 && !VOLUMES_ARE_IMAGES
 #define INNER_BYTES 1
-#define LERP(a, b, f) mad((b) - (a), f, a)
 #define INNER_UNIT (1.0f / 32767.0f)
-// A place comes with 15 binary places in x.
-#define INNER_X 32768.0f
+// A place comes with 15 binary places.
+#define INNER_PLACES 32768.0f
 
 #if LANES == 16 && defined(__AVX512BW__) && __has_builtin(__builtin_ia32_pmaddwd512)
 typedef short Words __attribute__((ext_vector_type(32)));
 typedef char Bytes __attribute__((ext_vector_type(64)));
-typedef Words Weights;
+typedef Words Weights; // those of two voxels side by side in x
 #define AS_WORDS(v) __builtin_astype(v, Words)
 #define FOUR(a, b, c, d) ((Int)(a, b, c, d, a, b, c, d, a, b, c, d, a, b, c, d))
 #define SHUFFLE(v, order) __builtin_astype(__builtin_ia32_pshufb512(__builtin_astype(v, Bytes), __builtin_astype(order, Bytes)), Words)
@@ -23,36 +24,75 @@ typedef Words Weights;
 // The low word of each lane in both.
 #define BOTH(v) SHUFFLE(v, FOUR(0x01000100, 0x05040504, 0x09080908, 0x0d0c0d0c))
 
-static inline Weights weights_x(Int x) {
+// Those at the fraction of x.
+static inline Weights weights_at(Int x) {
     // (1 - f, f) as words: (f & 0x7fff7fff) ^ 0x7fff in one instruction
     Int f = __builtin_astype(BOTH(x), Int);
     return AS_WORDS(__builtin_ia32_pternlogd512_mask(f, (Int)(0x7fff7fff), (Int)(0x7fff), 0x6a, (short)-1));
 }
+
+// The part of them that the fraction of `place` gives to the farther of two.
+static inline Weights farther(Weights w, Int place) {
+    return __builtin_ia32_pmulhrsw512(w, AS_WORDS(__builtin_astype(BOTH(place), Int) & 0x7fff7fff));
+}
+
+static inline Weights less(Weights w, Weights part) { return w - part; }
 
 // The bytes n and n + 1 of each lane's word, weighed.
 static inline Int weigh(Int word, int n, Weights w) { return MULTIPLY_ADD(SHUFFLE(word, PAIR_ORDER + n * 0x10001), w); }
 
 static inline Int product(Int small, int factor) { return MULTIPLY_ADD(AS_WORDS(small), AS_WORDS((Int)(factor))); }
 #else
-typedef Int Weights;
-static inline Weights weights_x(Int x) { return x & 0x7fff; }
-static inline Int weigh(Int word, int n, Weights f) {
-    Int a = (word >> (8 * n)) & 0xff, b = (word >> (8 * n + 8)) & 0xff;
-    return a * 32767 + (b - a) * f;
+typedef struct { Int a, b; } Weights;
+
+static inline Weights weights_at(Int x) {
+    Weights w = {0x7fff - (x & 0x7fff), x & 0x7fff};
+    return w;
 }
+
+static inline Weights farther(Weights w, Int place) {
+    Weights part = {(w.a * (place & 0x7fff) + 0x4000) >> 15, (w.b * (place & 0x7fff) + 0x4000) >> 15};
+    return part;
+}
+
+static inline Weights less(Weights w, Weights part) {
+    Weights rest = {w.a - part.a, w.b - part.b};
+    return rest;
+}
+
+static inline Int weigh(Int word, int n, Weights w) { return ((word >> (8 * n)) & 0xff) * w.a + ((word >> (8 * n + 8)) & 0xff) * w.b; }
+
 static inline Int product(Int small, int factor) { return small * factor; }
 #endif
 
-typedef struct { Int x, y, z; Weights weights; Real fy, fz; } Inner; // lowest corner in whole voxels
+// Where a sample is: its lowest corner in whole voxels, and the weights of the four pairs of voxels around it.
+typedef struct { Int x, y, z; Weights near, next, far, beyond; } Inner;
 
-static inline Inner inner_at(Real3 p) {
+// A place or a way in whole parts of 2^-15 voxels.
+typedef struct { Int x, y, z; } Fixed3;
+
+static inline Fixed3 fixed3(Real3 p) {
+    Fixed3 f = {to_int(p.x), to_int(p.y), to_int(p.z)};
+    return f;
+}
+
+static inline Fixed3 fixed3_nearest(Real3 p) { return fixed3(real3(floor(p.x + 0.5f), floor(p.y + 0.5f), floor(p.z + 0.5f))); }
+
+static inline Fixed3 add_fixed3(Fixed3 a, Fixed3 b) {
+    Fixed3 sum = {a.x + b.x, a.y + b.y, a.z + b.z};
+    return sum;
+}
+
+static inline Inner inner_of(Fixed3 p) {
     Inner i;
-    Int x = to_int(p.x);
-    i.weights = weights_x(x);
-    i.x = x >> 15, i.y = to_int(p.y), i.z = to_int(p.z);
-    i.fy = p.y - to_real(i.y), i.fz = p.z - to_real(i.z);
+    i.x = p.x >> 15, i.y = p.y >> 15, i.z = p.z >> 15;
+    Weights all = weights_at(p.x), behind = farther(all, p.z), front = less(all, behind);
+    i.next = farther(front, p.y), i.near = less(front, i.next);
+    i.beyond = farther(behind, p.y), i.far = less(behind, i.beyond);
     return i;
 }
+
+static inline Inner inner_at(Real3 p) { return inner_of(fixed3(p)); }
 
 static inline Int inner_offset(constant const View *view, Inner i) {
     return (product(i.z, view->dims[1]) + i.y) * view->dims[0] + i.x;
@@ -62,41 +102,33 @@ static inline Real inner_raw(constant const View *view, VOLUME voxels, Real3 p) 
     Inner i = inner_at(p);
     Int at = inner_offset(view, i);
     int row = view->dims[0], sheet = view->dims[0] * view->dims[1];
-    #define LINE(step) to_real(weigh(gather_words(voxels + (step), at), 0, i.weights))
-    Real a = LINE(0), b = LINE(row), c = LINE(sheet), d = LINE(sheet + row);
-    #undef LINE
-    Real near = LERP(a, c, i.fz), far = LERP(b, d, i.fz);
-    return LERP(near, far, i.fy);
+    #define PAIR(step, weights) weigh(gather_words(voxels + (step), at), 0, weights)
+    return to_real((PAIR(0, i.near) + PAIR(row, i.next)) + (PAIR(sheet, i.far) + PAIR(sheet + row, i.beyond)));
+    #undef PAIR
 }
 
-// Value and gradient by central differences, in units of INNER_UNIT a voxel. Twelve gathers instead of the 28 of seven values: a
-// gather of four voxels in x serves three of them, and rows are shared.
+// Value and gradient by central differences. Twelve gathers instead of the 28 of
+// seven values: a gather of four voxels in x serves three of them, and rows are shared.
 static inline Real inner_gradient(constant const View *view, VOLUME voxels, Real3 p, Real3 *gradient) {
     Inner i = inner_at(p);
     Int at = inner_offset(view, i);
     int row = view->dims[0], sheet = view->dims[0] * view->dims[1];
     global const uchar *from = voxels - 1; // the lanes are a voxel or more inside
     #define ROW(y, z) gather_words(from + ((y) * row + (z) * sheet), at)
-    #define SLOPE(v) to_real(weigh(v, 2, i.weights) - weigh(v, 0, i.weights))
-    #define LINE(v) to_real(weigh(v, 1, i.weights))
-    Int va = ROW(0, 0), vb = ROW(1, 0), vc = ROW(0, 1), vd = ROW(1, 1);
-    Real near = LERP(SLOPE(va), SLOPE(vc), i.fz), far = LERP(SLOPE(vb), SLOPE(vd), i.fz);
-    gradient->x = 0.5f * LERP(near, far, i.fy);
-    Real a = LINE(va), b = LINE(vb), c = LINE(vc), d = LINE(vd);
-    Real y0 = LERP(a, c, i.fz), y1 = LERP(b, d, i.fz);
-    Real before = LERP(LINE(ROW(-1, 0)), LINE(ROW(-1, 1)), i.fz), after = LERP(LINE(ROW(2, 0)), LINE(ROW(2, 1)), i.fz);
-    gradient->y = 0.5f * (LERP(y1, after, i.fy) - LERP(before, y0, i.fy));
-    Real z0 = LERP(a, b, i.fy), z1 = LERP(c, d, i.fy);
-    before = LERP(LINE(ROW(0, -1)), LINE(ROW(1, -1)), i.fy), after = LERP(LINE(ROW(0, 2)), LINE(ROW(1, 2)), i.fy);
-    gradient->z = 0.5f * (LERP(z1, after, i.fz) - LERP(before, z0, i.fz));
+    #define ALL(n, a, b, c, d) ((weigh(a, n, i.near) + weigh(b, n, i.next)) + (weigh(c, n, i.far) + weigh(d, n, i.beyond)))
+    Int a = ROW(0, 0), b = ROW(1, 0), c = ROW(0, 1), d = ROW(1, 1);
+    Int y0 = ROW(-1, 0), y1 = ROW(-1, 1), y2 = ROW(2, 0), y3 = ROW(2, 1);
+    Int z0 = ROW(0, -1), z1 = ROW(1, -1), z2 = ROW(0, 2), z3 = ROW(1, 2);
+    gradient->x = to_real(ALL(2, a, b, c, d) - ALL(0, a, b, c, d));
+    gradient->y = to_real(ALL(1, b, y2, d, y3) - ALL(1, y0, a, y1, c));
+    gradient->z = to_real(ALL(1, c, d, z2, z3) - ALL(1, z0, z1, a, b));
+    return to_real(ALL(1, a, b, c, d));
     #undef ROW
-    #undef SLOPE
-    #undef LINE
-    return LERP(y0, y1, i.fy);
+    #undef ALL
 }
 #else
 #define INNER_UNIT 1.0f
-#define INNER_X 1.0f
+#define INNER_PLACES 1.0f
 
 static inline Real inner_raw(constant const View *view, VOLUME voxels, Real3 p) {
 #if INTERPOLATION != TRILINEAR || VOLUMES_ARE_IMAGES
@@ -114,11 +146,11 @@ static inline Real inner_raw(constant const View *view, VOLUME voxels, Real3 p) 
 }
 
 static inline Real inner_gradient(constant const View *view, VOLUME voxels, Real3 p, Real3 *gradient) {
-    *gradient = gradient_raw(view, voxels, real3(p.x + 0.5f, p.y + 0.5f, p.z + 0.5f));
+    *gradient = scale3(gradient_raw(view, voxels, real3(p.x + 0.5f, p.y + 0.5f, p.z + 0.5f)), (Real)(2.0f));
     return inner_raw(view, voxels, p);
 }
 #endif
 
 // A place or a way in index units as inner_raw takes it: places count from the middle of voxel 0.
-static inline Real3 inner_way(Real3 way) { return real3(way.x * INNER_X, way.y, way.z); }
+static inline Real3 inner_way(Real3 way) { return scale3(way, (Real)(INNER_PLACES)); }
 static inline Real3 inner_place(Real3 p) { return inner_way(real3(p.x - 0.5f, p.y - 0.5f, p.z - 0.5f)); }

@@ -83,11 +83,14 @@ static inline int count_lanes(Mask m) {
 #endif
 }
 
+// The lesser and the greater of two; b where a is not a number.
+#define LESSER(a, b) ((a) < (b) ? (a) : (b))
+#define GREATER(a, b) ((a) > (b) ? (a) : (b))
+
 #if LANES == 1
 static inline float least_lane(Real v) { return v; }
 #else
 static inline float least_lane(Real v) {
-    #define LESSER(a, b) ((a) < (b) ? (a) : (b))
 #if LANES == 16
     float8 eight = LESSER(v.lo, v.hi);
     float4 four = LESSER(eight.lo, eight.hi);
@@ -98,7 +101,6 @@ static inline float least_lane(Real v) {
 #endif
     float2 two = LESSER(four.lo, four.hi);
     return LESSER(two.x, two.y);
-    #undef LESSER
 }
 #endif
 

@@ -50,25 +50,23 @@ static inline int beams(constant const View *view) {
 static inline void narrow_range(constant const View *view, Packet *p) {
     float from = (float)p->inner, steps = (float)max(p->inner_end - p->inner, 1), room = steps;
     float low[3], pace[3];
-    #define AXIS(i, c, scale)                                                                                              \
+    #define AXIS(i, c)                                                                                                     \
         {                                                                                                                  \
             Real a = p->start.c + p->pace.c * from, b = a + p->pace.c * steps;                                             \
             float low_a = least_lane(a), low_b = least_lane(b), wide_a = greatest_lane(a) - low_a, wide_b = greatest_lane(b) - low_b; \
-            float spare = NARROW * scale - wide_a, growth = (wide_b - wide_a) / steps;                                     \
-            pace[i] = (low_b - low_a) / (steps * scale);                                                                   \
-            low[i] = low_a / scale - pace[i] * from - 0.01f;                                                               \
+            float spare = NARROW * INNER_PLACES - wide_a, growth = (wide_b - wide_a) / steps;                                     \
+            pace[i] = (low_b - low_a) / (steps * INNER_PLACES);                                                                 \
+            low[i] = low_a / INNER_PLACES - pace[i] * from - 0.01f;                                                           \
             room = spare < 0.0f ? 0.0f : growth * room > spare ? spare / growth : room;                                    \
         }
-    AXIS(0, x, INNER_X)
-    AXIS(1, y, 1.0f)
-    AXIS(2, z, 1.0f)
+    AXIS(0, x)
+    AXIS(1, y)
+    AXIS(2, z)
     #undef AXIS
     p->low = (float4)(low[0], low[1], low[2], 0.0f);
     p->low_pace = (float4)(pace[0], pace[1], pace[2], 0.0f);
     p->narrow_end = min(p->inner + (int)room, p->inner_end);
-#if SHADED
-    if (min(view->dims[0], min(view->dims[1], view->dims[2])) < WIDE_LEAST) p->narrow_end = p->inner;
-#endif
+    if (min(view->dims[0], min(view->dims[1], view->dims[2])) < NARROW_LEAST) p->narrow_end = p->inner;
 }
 #endif
 
@@ -170,9 +168,26 @@ static inline int beam_leap(constant const View *view, const Beam *b, global con
 static inline Real whole_step_raw(constant const View *view, VOLUME voxels, const Packet *p, int k) {
     Real3 place = along(p->start, p->pace, (Real)((float)k));
 #ifdef NARROW
-    if (k < p->narrow_end) return narrow_raw(view, voxels, place, convert_int4(p->low + p->low_pace * (float)k)) * INNER_UNIT;
+    if (k < p->narrow_end) return narrow_raw(view, voxels, place, p->low + p->low_pace * (float)k) * INNER_UNIT;
 #endif
     return inner_raw(view, voxels, place) * INNER_UNIT;
+}
+
+// The raw values in units of INNER_UNIT at the samples of the steps from k to end - 1, at most STRIDE, which are whole in every
+// lane: inner <= k, end <= inner_end.
+static inline void whole_steps_raw(constant const View *view, VOLUME voxels, const Packet *p, int k, int end, Real *raw) {
+    int i = 0;
+#ifdef NARROW
+    if (k < p->narrow_end) {
+        BlockPlaces places = block_places(view, p->low + p->low_pace * (float)k, p->low_pace);
+        Fixed3 at = fixed3(along(p->start, p->pace, (Real)((float)k))), pace = fixed3_nearest(p->pace);
+        for (; i < min(end, p->narrow_end) - k; i++, at = add_fixed3(at, pace)) {
+            Block block = block_at(view, voxels, &places, i);
+            raw[i] = block_raw(&block, inner_of(at));
+        }
+    }
+#endif
+    for (; i < end - k; i++) raw[i] = inner_raw(view, voxels, along(p->start, p->pace, (Real)((float)(k + i))));
 }
 
 // The part of step k that is inside the lane's ray: where its sample lies and for how long it stands, both in t.

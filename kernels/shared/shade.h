@@ -16,22 +16,19 @@ static inline void half_ways(constant const View *view, Real3 ray, Real3 half_wa
     }
 }
 
-// `colour` as lit on the world gradient n. Where the field is flat there is no surface to turn towards the light: full diffuse,
-// no highlight.
-static inline Real3 shade(constant const View *view, Real3 n, const Real3 half_way[MAX_LIGHTS], Real3 colour) {
+// `colour` as lit on the world gradient n, which is in units of `unit`. Where the field is flat there is no surface to turn towards
+// the light: full diffuse, no highlight.
+static inline Real3 shade(constant const View *view, Real3 n, float unit, const Real3 half_way[MAX_LIGHTS], Real3 colour) {
     Real squared = dot3(n, n);
-    Mask flat = MASK(!(squared > view->flat_squared));
+    Mask flat = MASK(!(squared > view->flat_squared / (unit * unit)));
     Real scale = select(inverse_root(squared), (Real)(0.0f), flat);
     Real3 body = real3(view->ambient, view->ambient, view->ambient), shine = real3(0.0f, 0.0f, 0.0f);
     for (int i = 0; i < view->lights; i++) {
-        constant const float *d = view->light_direction + 3 * i, *c = view->light_color + 3 * i;
-        Real facing = fabs(mad(n.x, d[0], mad(n.y, d[1], n.z * d[2]))) * scale;
-        Real along_half = fmin(fabs(dot3(n, half_way[i])) * scale, (Real)(1.0f));
-        Real lambert = view->diffuse * select(facing, (Real)(1.0f), flat);
-        Real glint = view->specular * power(along_half, view->shininess);
-        glint = select(glint, (Real)(0.0f), flat);
-        body = real3(mad(lambert, c[0], body.x), mad(lambert, c[1], body.y), mad(lambert, c[2], body.z));
-        shine = real3(mad(glint, c[0], shine.x), mad(glint, c[1], shine.y), mad(glint, c[2], shine.z));
+        constant const float *d = view->light_direction + 3 * i, *lambert = view->lambert + 3 * i, *highlight = view->highlight + 3 * i;
+        Real facing = select(fabs(mad(n.x, d[0], mad(n.y, d[1], n.z * d[2]))) * scale, (Real)(1.0f), flat);
+        Real glint = power(fmin(fabs(dot3(n, half_way[i])) * scale, (Real)(1.0f)), view->shininess);
+        body = real3(mad(facing, lambert[0], body.x), mad(facing, lambert[1], body.y), mad(facing, lambert[2], body.z));
+        shine = real3(mad(glint, highlight[0], shine.x), mad(glint, highlight[1], shine.y), mad(glint, highlight[2], shine.z));
     }
     return real3(mad(colour.x, body.x, shine.x), mad(colour.y, body.y, shine.y), mad(colour.z, body.z, shine.z));
 }

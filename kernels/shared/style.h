@@ -77,7 +77,7 @@ static inline Real3 shade_translucent(constant const View *view, constant const 
     Mask towards = MASK(dot3(n, s->ray) > 0.0f);
     n = select3(n, scale3(n, (Real)(-1.0f)), towards);
     for (int i = 0; i < view->lights; i++) {
-        constant const float *d = view->light_direction + 3 * i, *c = view->light_color + 3 * i;
+        constant const float *d = view->light_direction + 3 * i, *lambert = view->lambert + 3 * i, *highlight = view->highlight + 3 * i;
         Real facing = mad(n.x, d[0], mad(n.y, d[1], n.z * d[2]));
         Mask behind = MASK(facing < 0.0f);
         Real mirror = select((Real)(0.0f), -2.0f * facing, behind);
@@ -85,10 +85,10 @@ static inline Real3 shade_translucent(constant const View *view, constant const 
         Real along_half = clamp(dot3(n, h) * rsqrt(fmax(dot3(h, h), (Real)(1e-12f))), (Real)(1e-6f), (Real)(1.0f));
         Real exponent = select((Real)(view->shininess), (Real)(params->translucency_exponent), behind);
         Real share = select((Real)(1.0f - params->translucency), (Real)(params->translucency), behind);
-        Real lambert = view->diffuse * share * select(fabs(facing), (Real)(1.0f), s->flat);
-        Real glint = select(view->specular * share * exp2(exponent * log2(along_half)), (Real)(0.0f), s->flat);
-        body = real3(mad(lambert, c[0], body.x), mad(lambert, c[1], body.y), mad(lambert, c[2], body.z));
-        shine = real3(mad(glint, c[0], shine.x), mad(glint, c[1], shine.y), mad(glint, c[2], shine.z));
+        Real turned = share * select(fabs(facing), (Real)(1.0f), s->flat);
+        Real glint = select(share * exp2(exponent * log2(along_half)), (Real)(0.0f), s->flat);
+        body = real3(mad(turned, lambert[0], body.x), mad(turned, lambert[1], body.y), mad(turned, lambert[2], body.z));
+        shine = real3(mad(glint, highlight[0], shine.x), mad(glint, highlight[1], shine.y), mad(glint, highlight[2], shine.z));
     }
     return real3(mad(colour.x, body.x, shine.x), mad(colour.y, body.y, shine.y), mad(colour.z, body.z, shine.z));
 }
@@ -101,7 +101,7 @@ static inline Real3 styled_colour(constant const View *view, constant const Emis
     if (params->lit) {
         Real3 half_way[MAX_LIGHTS];
         half_ways(view, s->ray, half_way);
-        return shade(view, s->gradient, half_way, colour);
+        return shade(view, s->gradient, 1.0f, half_way, colour);
     }
     return colour;
 }

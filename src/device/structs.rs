@@ -127,17 +127,15 @@ device_struct! {
         pub flat_squared: f32,
         /// Weight of light from everywhere.
         pub ambient: f32,
-        /// Weight of Lambert's term.
-        pub diffuse: f32,
-        /// Weight of the highlight.
-        pub specular: f32,
         /// Exponent of the highlight.
         pub shininess: f32,
         /// How many lights there are.
         pub lights: i32,
         /// Towards each light, world space, unit length.
         pub light_direction: [f32; 3 * LIGHTS],
-        /// Linear colour of each light.
-        pub light_color: [f32; 3 * LIGHTS],
+        /// Linear colour of each light times the weight of Lambert's term.
+        pub lambert: [f32; 3 * LIGHTS],
+        /// Linear colour of each light times the weight of the highlight.
+        pub highlight: [f32; 3 * LIGHTS],
     }
 }

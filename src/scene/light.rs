@@ -118,11 +118,11 @@ impl LightRequest {
         for (i, light) in lights.iter().take(LIGHTS).enumerate() {
             let towards = light.direction.map_or(camera.towards_eye(), |d| DVec3::from(d).normalize());
             view.light_direction[3 * i..3 * i + 3].copy_from_slice(&towards.as_vec3().to_array());
-            view.light_color[3 * i..3 * i + 3].copy_from_slice(&light.color.map(|c| c as f32));
+            let times = |weight: f64| light.color.map(|c| (weight * c) as f32);
+            view.lambert[3 * i..3 * i + 3].copy_from_slice(&times(self.diffuse));
+            view.highlight[3 * i..3 * i + 3].copy_from_slice(&times(self.specular));
         }
         view.ambient = self.ambient as f32;
-        view.diffuse = self.diffuse as f32;
-        view.specular = self.specular as f32;
         view.shininess = self.shininess as f32;
     }
 }

@@ -243,10 +243,9 @@ impl TransferFunction {
             if self.evaluate(low + width * i as f64).1 <= 0.0 {
                 continue;
             }
-            // An entry stands for the values nearer to it than to the next, and a little more, since the device rounds; the
-            // outermost for all beyond.
-            let from = if i == 0 { f64::NEG_INFINITY } else { low + width * (i as f64 - 0.6) };
-            let to = if i == TABLE_SIZE - 1 { f64::INFINITY } else { low + width * (i as f64 + 0.6) };
+            // Opacity begins and ends at the entries before and after, less what is nothing; the outermost stand for all beyond.
+            let from = if i == 0 { f64::NEG_INFINITY } else { low + width * (i as f64 - 0.999) };
+            let to = if i == TABLE_SIZE - 1 { f64::INFINITY } else { low + width * (i as f64 + 0.999) };
             match intervals.last_mut() {
                 Some(last) if last[1] >= from => last[1] = to,
                 _ => intervals.push([from, to]),
@@ -255,19 +254,18 @@ impl TransferFunction {
         intervals
     }
 
-    /// The device's table over [`TransferFunction::domain`] for steps of `step` world units: two words an entry, as `classify` in
-    /// `kernels/emission_absorption.cl` takes them apart.
-    pub fn table(&self, opacity_scale: f64, step: f64) -> Vec<u32> {
+    /// The entries of the device's table over [`TransferFunction::domain`]: linear colour and the opacity of `step` world units.
+    pub fn entries(&self, opacity_scale: f64, step: f64) -> Vec<([f64; 3], f64)> {
         let [low, high] = self.domain();
         let entry = |i: usize| {
             let (color, sigma) = self.evaluate(low + (high - low) * i as f64 / (TABLE_SIZE - 1) as f64);
-            pack(color, -(-sigma * opacity_scale * step).exp_m1())
+            (color, -(-sigma * opacity_scale * step).exp_m1())
         };
-        (0..TABLE_SIZE).flat_map(entry).collect()
+        (0..TABLE_SIZE).map(entry).collect()
     }
 }
 
-/// A colour and an opacity in two words: the float of the opacity, rounded to 13 bits after the point, with blue in its ten
+/// A colour and an opacity in two words, as `optical` in `kernels/emission_absorption.cl` takes them apart: the float of the opacity, rounded to 13 bits after the point, with blue in its ten
 /// lowest and two highest bits; then red and green, turned to where a float's fraction has them.
 pub(crate) fn pack(color: [f64; 3], opacity: f64) -> [u32; 2] {
     let bits = |c: f64, most: f64| (c.clamp(0.0, 1.0) * most).round() as u32;

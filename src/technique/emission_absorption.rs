@@ -30,6 +30,7 @@
 //!
 //! Example: see [`example`], which a test runs.
 
+pub mod pieces;
 pub mod plan;
 pub mod regions;
 pub mod style;

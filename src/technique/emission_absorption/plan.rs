@@ -2,6 +2,7 @@
 
 use serde_json::Value;
 
+use super::pieces::pieces;
 use super::{EmissionAbsorption, Parameters, TECHNIQUE, regions};
 use crate::device::program::{Source, Variant};
 use crate::device::structs::{DeviceStruct, View as DeviceView};
@@ -9,7 +10,7 @@ use crate::error::Result;
 use crate::scene::camera::Camera;
 use crate::scene::interpolation::Interpolation;
 use crate::scene::presets;
-use crate::scene::transfer::{TABLE_SIZE, TransferFunction};
+use crate::scene::transfer::{TABLE_SIZE, TransferFunction, pack};
 use crate::technique::steps::coarse_step;
 use crate::technique::{CellUse, VIEW_HEADERS, View, ViewPlan};
 use crate::volume::{Volume, VoxelType};
@@ -179,7 +180,8 @@ impl View for Parameters {
         Ok(if self.pre_integrated {
             function.integrals(self.opacity_scale)
         } else {
-            function.table(self.opacity_scale, step)
+            let entries = function.entries(self.opacity_scale, step);
+            entries.iter().flat_map(|&(color, opacity)| pack(color, opacity)).chain(pieces(&entries)).collect()
         })
     }
 

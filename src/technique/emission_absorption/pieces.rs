@@ -1,0 +1,147 @@
+//! The transfer function's table as a few polynomials, for those that are smooth but for some kinks, as most are.
+//!
+//! What 16 lanes see in eight steps differs little as a rule, so that it lies on one piece or two: then a cubic for the opacity and a
+//! line for each colour, with coefficients that all lanes share, take the place of 128 looks into the table. A function that
+//! takes more than [`PIECES`] has none, and is looked up. Which it is depends on the function alone, and which piece on the value
+//! alone, so that a picture does not depend on what is sampled together.
+
+use crate::scene::transfer::TABLE_SIZE;
+
+/// Most pieces: lanes of a register. `PIECES` in `kernels/emission_absorption.cl`.
+pub const PIECES: usize = 16;
+/// How far an opacity may be off in parts of itself, so that a picture is by no more.
+const OPACITY_SLACK: f32 = 1.0 / 2048.0;
+/// How far it may be off besides, and that in parts of the greatest, for where it is next to nothing.
+const LEAST_SLACK: [f32; 2] = [1.0 / 262_144.0, 1.0 / 16_384.0];
+/// How far a colour may be off: an eighth of a level of 255.
+const COLOUR_SLACK: f32 = 1.0 / 2048.0;
+
+/// An entry as the kernel decodes it: channels from 1 on (see `CHANNEL` in `kernels/emission_absorption.cl`), opacity.
+#[derive(Clone, Copy)]
+struct Entry {
+    channels: [f32; 3],
+    opacity: f32,
+}
+
+/// Polynomials in the entry's number less that of the first, the constant first.
+#[derive(Clone, Copy, Default)]
+struct Piece {
+    first: usize,
+    /// The last entry up to which there is no opacity; before the first for none.
+    empty: f32,
+    opacity: [f32; 4],
+    channels: [[f32; 2]; 3],
+}
+
+impl Piece {
+    /// Through the values at the Chebyshev points of `first..=last`, which is close to the best that there is.
+    fn through(entries: &[Entry], first: usize, last: usize) -> Self {
+        let half = (last - first) as f64 / 2.0;
+        let place =
+            |i: usize, of: usize| half - half * (std::f64::consts::PI * (2 * i + 1) as f64 / (2 * of) as f64).cos();
+        let value = |x: f64, part: &dyn Fn(&Entry) -> f32| {
+            let i = (x as usize).min(last - first - 1);
+            let [a, b] = [i, i + 1].map(|i| f64::from(part(&entries[first + i])));
+            a + (b - a) * (x - i as f64)
+        };
+        let opacity = |i| [place(i, 4), value(place(i, 4), &|e| e.opacity)];
+        let channel = |c: usize| move |i| [place(i, 2), value(place(i, 2), &|e| e.channels[c])];
+        let mut piece = Self {
+            first,
+            empty: first as f32 - 1.0,
+            opacity: polynomial(std::array::from_fn(opacity)),
+            channels: std::array::from_fn(|c| polynomial(std::array::from_fn(channel(c)))),
+        };
+        if entries[first].opacity == 0.0 {
+            (piece.empty, piece.opacity[0]) = (first as f32, 0.0);
+        }
+        piece
+    }
+
+    /// Whether every entry of `first..=last` is met closely enough; `least` is what an opacity may be off anyway.
+    fn holds(&self, entries: &[Entry], last: usize, least: f32) -> bool {
+        (self.first..=last).all(|i| {
+            let (Entry { channels, opacity }, x) = (entries[i], (i - self.first) as f32);
+            let [c0, c1, c2, c3] = self.opacity;
+            let off = (((c3 * x + c2) * x + c1) * x + c0 - opacity).abs();
+            let close = |c: usize| (self.channels[c][1] * x + self.channels[c][0] - channels[c]).abs() <= COLOUR_SLACK;
+            off <= opacity * OPACITY_SLACK + least && (opacity == 0.0 || (0..3).all(close))
+        })
+    }
+
+    /// The longest from `first` on, and its last entry. What has no opacity is a piece of its own.
+    fn longest(entries: &[Entry], first: usize, least: f32) -> (Self, usize) {
+        let end = entries.len() - 1;
+        let empty = entries[first..].iter().take_while(|e| e.opacity == 0.0).count();
+        if empty > 1 {
+            let last = first + empty - 1;
+            return (Self { first, empty: last as f32, ..Self::default() }, last);
+        }
+        let fits = |last: usize| Some(Self::through(entries, first, last)).filter(|p| p.holds(entries, last, least));
+        // Two entries are met by a line.
+        let (mut best, mut good) = (Self::through(entries, first, first + 1), first + 1);
+        let (mut bad, mut reach) = (end + 1, 2);
+        while good < end && bad - good > 1 {
+            let last = (first + reach).min(end).min(if bad > end { end } else { (good + bad) / 2 });
+            match fits(last) {
+                Some(piece) => (best, good) = (piece, last),
+                None => bad = last,
+            }
+            reach *= 2;
+        }
+        (best, good)
+    }
+}
+
+/// The coefficients, the constant first, of the polynomial through `points` of place and value (Newton's divided differences).
+fn polynomial<const N: usize>(points: [[f64; 2]; N]) -> [f32; N] {
+    let mut divided = points.map(|p| p[1]);
+    for order in 1..N {
+        for i in (order..N).rev() {
+            divided[i] = (divided[i] - divided[i - 1]) / (points[i][0] - points[i - order][0]);
+        }
+    }
+    let mut sum = [0.0; N];
+    for i in (0..N).rev() {
+        for power in (0..N).rev() {
+            let lower = if power > 0 { sum[power - 1] } else { divided[i] };
+            sum[power] = lower - points[i][0] * sum[power];
+        }
+    }
+    sum.map(|c| c as f32)
+}
+
+/// The words that follow the table, in columns of [`PIECES`]: where each piece begins, up to where it is empty, and its
+/// coefficients. Pieces that there are not begin past the table; where it takes too many, all of them do.
+pub fn pieces(colours: &[([f64; 3], f64)]) -> Vec<u32> {
+    let entries: Vec<Entry> = colours
+        .iter()
+        .map(|&(color, opacity)| Entry {
+            channels: std::array::from_fn(|c| {
+                let part = if c < 2 { 65535.0 / 65536.0 } else { 4095.0 / 4096.0 };
+                (1.0 + color[c].clamp(0.0, 1.0) * part) as f32
+            }),
+            opacity: opacity.clamp(0.0, 1.0) as f32,
+        })
+        .collect();
+    let greatest = entries.iter().map(|e| e.opacity).fold(0.0, f32::max);
+    let least = LEAST_SLACK[0].min(LEAST_SLACK[1] * greatest);
+    let (mut found, mut from) = (Vec::new(), 0);
+    while from < entries.len() - 1 && found.len() <= PIECES {
+        let (piece, last) = Piece::longest(&entries, from, least);
+        found.push(piece);
+        from = last;
+    }
+    if found.len() > PIECES {
+        found.clear();
+    }
+    let column = |part: &dyn Fn(&Piece) -> f32, none: f32| -> Vec<u32> {
+        (0..PIECES).map(|i| found.get(i).map_or(none, part).to_bits()).collect()
+    };
+    let beyond = TABLE_SIZE as f32;
+    let mut words = column(&|p| p.first as f32, beyond);
+    words.extend(column(&|p| p.empty, beyond));
+    words.extend((0..4).flat_map(|i| column(&|p| p.opacity[i], 0.0)));
+    words.extend((0..6).flat_map(|i| column(&|p| p.channels[i / 2][i % 2], 0.0)));
+    words
+}
