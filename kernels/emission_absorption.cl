@@ -7,16 +7,6 @@ typedef struct { Real3 colour; Real alpha; } Optical;
 
 typedef struct { Real3 colour; Real transmittance; } Radiance;
 
-// A colour is kept as 1 + channel * 65535/65536 (blue: 4095/4096): then its bits in the table are those of a float's fraction.
-// What is composited of it is too high by 1 - transmittance. Where samples are coloured one by one it is decoded before.
-#define DECODED_EACH (SHADED || STYLED || PREINTEGRATED)
-#define CHANNEL(bits, mask) as_Real(((bits) & (mask)) | 0x3f800000)
-
-static inline Real3 decoded(Real3 colour, Real weight) {
-    Real3 c = real3(fmax(colour.x - weight, (Real)(0.0f)), fmax(colour.y - weight, (Real)(0.0f)), fmax(colour.z - weight, (Real)(0.0f)));
-    return real3(c.x * (65536.0f / 65535.0f), c.y * (65536.0f / 65535.0f), c.z * (4096.0f / 4095.0f));
-}
-
 // An entry of the table is two words: the opacity's float less its ten lowest bits, which hold the upper bits of blue, its two
 // lowest above (an opacity is at most 1); then 16 bits each of red and green, turned right by 25 and 9 bits.
 typedef struct { Int word, red_green; } Entry;
@@ -31,7 +21,10 @@ static inline Optical optical(Entry e) {
     Optical o;
     o.alpha = as_Real(e.word & 0x3ffffc00);
     Int green = as_Int(rotate(as_UInt(e.red_green), (UInt)(16u))), blue = as_Int(rotate(as_UInt(e.word), (UInt)(13u)));
-    o.colour = real3(CHANNEL(e.red_green, 0x007fff80), CHANNEL(green, 0x007fff80), CHANNEL(blue, 0x007ff800));
+    // The bits of a channel are those of the fraction of a float of 1 to 2.
+    #define CHANNEL(bits, mask, most) ((as_Real(((bits) & (mask)) | 0x3f800000) - 1.0f) * ((most + 1.0f) / most))
+    o.colour = real3(CHANNEL(e.red_green, 0x007fff80, 65535.0f), CHANNEL(green, 0x007fff80, 65535.0f), CHANNEL(blue, 0x007ff800, 4095.0f));
+    #undef CHANNEL
     return o;
 }
 
@@ -125,9 +118,6 @@ static inline Optical optical_at(global const uchar *table, Span s, int form, Re
 #if VOXEL == VOXEL_F32
     o.alpha = select(o.alpha, (Real)(0.0f), MASK(place != place));
 #endif
-#if DECODED_EACH
-    o.colour = decoded(o.colour, (Real)(1.0f));
-#endif
     return o;
 }
 
@@ -146,7 +136,7 @@ static inline Optical classify(constant const EmissionAbsorption *params, global
 #if SHADED
 // The colour of a sample of gradient g, in `unit` a voxel, under the lights.
 static inline Real3 lit(constant const View *view, const Packet *p, Real3 g, float unit, Real3 colour) {
-    return shade(view, gradient_world(view, g), unit, p->half_way, colour);
+    return shade(view, g, unit, p->half_way, colour);
 }
 #endif
 
@@ -175,7 +165,6 @@ static inline Optical classify_2d(constant const EmissionAbsorption *params, glo
     Real g = clamp(mad(magnitude, (Real)(params->gradient_scale), (Real)(0.5f)), (Real)(0.0f), (Real)(255.0f));
     Optical o = optical(entry_at(table, to_int(select(v, (Real)(0.0f), nan)) + (to_int(select(g, (Real)(0.0f), nan)) << 8)));
     o.alpha = select(o.alpha, (Real)(0.0f), nan);
-    o.colour = decoded(o.colour, (Real)(1.0f));
     return o;
 }
 
@@ -244,7 +233,7 @@ static inline void preintegrated_step(constant const View *view, constant const 
     o.colour = real3(between(table, 1, a, b, close) * inverse, between(table, 2, a, b, close) * inverse, between(table, 3, a, b, close) * inverse);
 #if SHADED
     Real3 at = along(p->ray.origin, p->ray.direction, 0.5f * (from + to));
-    o.colour = shade(view, gradient_world(view, gradient_raw(view, voxels, at)), 1.0f, p->half_way, o.colour);
+    o.colour = shade(view, gradient_raw(view, voxels, at), 1.0f, p->half_way, o.colour);
 #endif
     composite(params, o, r);
 }
@@ -398,7 +387,6 @@ kernel void emission_absorption(constant View *view, constant EmissionAbsorption
 #endif
     for (int i = 0; i < PACKETS; i++) {
         Real alpha = 1.0f - r[i].transmittance;
-        Real3 colour = scale3(DECODED_EACH ? r[i].colour : decoded(r[i].colour, alpha), (Real)(params->brightness));
-        film_packet(view, film, counts, packets[i].column, packets[i].row, colour, alpha);
+        film_packet(view, film, counts, packets[i].column, packets[i].row, scale3(r[i].colour, (Real)(params->brightness)), alpha);
     }
 }

@@ -61,12 +61,12 @@ static inline Real3 surface_colour(constant const View *view, constant const Iso
         return real3(depth, depth, depth);
     }
     Real3 at = along(p->ray.origin, p->ray.direction, t), ray = ray_world(view, p->x, p->y);
-    Real3 gradient = gradient_world(view, surface_gradient(view, voxels, params->analytic, at, found));
+    Real3 slope = surface_gradient(view, voxels, params->analytic, at, found);
     Real3 half_way[MAX_LIGHTS];
     half_ways(view, ray, half_way);
-    Real3 lit = shade(view, gradient, 1.0f, half_way, colour);
+    Real3 lit = shade(view, slope, 1.0f, half_way, colour);
     if (params->occlusion_rays > 0) {
-        Real hidden = view->ambient * occlusion(view, params, voxels, p, b, at, ray, gradient, found);
+        Real hidden = view->ambient * occlusion(view, params, voxels, p, b, at, ray, gradient_world(view, slope), found);
         lit = real3(mad(-hidden, colour.x, lit.x), mad(-hidden, colour.y, lit.y), mad(-hidden, colour.z, lit.z));
     }
     return lit;

@@ -57,7 +57,7 @@ static inline Block block_at(constant const View *view, VOLUME voxels, const Blo
 
 static inline Real block_raw(const Block *block, Inner i) {
     Int at = (i.z << 2) + i.y + block->rows;
-    Int order = __builtin_astype(BOTH(i.x), Int) + (PAIR_ORDER + block->bytes);
+    Int order = __builtin_astype(BOTH_HIGH(i.at.x), Int) + (PAIR_ORDER + block->bytes);
     #define PAIR(n, weights) MULTIPLY_ADD(SHUFFLE(__builtin_ia32_permvarsi512(block->voxels, at + (n)), order), weights)
     return to_real((PAIR(0, i.near) + PAIR(1, i.next)) + (PAIR(4, i.far) + PAIR(5, i.beyond)));
     #undef PAIR
@@ -89,19 +89,31 @@ static inline WideBlock wide_block_at(constant const View *view, global const uc
     return b;
 }
 
-// The rows from x voxels beside the block's lowest corner on.
+// Rows in pairs, row z * 4 + y after the one before: of the block's first eight a pair in each quarter of a register, and of its last
+// eight a pair behind each. So what unpack instructions take from all quarters, first the lower halves, then the upper, is in order.
+#define DEALT(v, w) __builtin_shufflevector(v, w, 0, 2, 16, 18, 4, 6, 20, 22, 8, 10, 24, 26, 12, 14, 28, 30)
+#define ROW_AFTER(v, w) __builtin_shufflevector(v, w, 1, 4, 3, 6, 5, 20, 7, 22, 9, 12, 11, 14, 13, 21, 15, 23)
+#define ROW_BEFORE(v, w) __builtin_shufflevector(v, w, 16, 0, 18, 2, 1, 4, 3, 6, 17, 8, 19, 10, 9, 12, 11, 14)
+#define SHEET_AFTER(v, w) __builtin_shufflevector(v, w, 8, 9, 10, 11, 12, 13, 14, 15, 2, 3, 28, 29, 6, 7, 30, 31)
+#define SHEET_BEFORE(v, w) __builtin_shufflevector(v, w, 24, 25, 8, 9, 26, 27, 12, 13, 0, 1, 2, 3, 4, 5, 6, 7)
+
+// The rows from x voxels beside the block's lowest corner on, dealt.
 static inline Int wide_rows(const WideBlock *b, int x) {
-    return (Int)(as_int16(b->low >> (8 * x + 8)).even, as_int16(b->high >> (8 * x + 8)).even);
+    return DEALT(as_int16(b->low >> (8 * x + 8)), as_int16(b->high >> (8 * x + 8)));
 }
 
-typedef uchar Row32 __attribute__((ext_vector_type(32)));
 typedef struct { Words low, high; } Field; // a word for each voxel of the block
 
-// The differences of two sets of bytes.
+// The differences of two sets of bytes in dealt rows.
 static inline Field field_of(Int after, Int before) {
-    #define WORDS(half) __builtin_convertvector(__builtin_astype(half, Row32), Words)
-    Field f = {WORDS(after.lo) - WORDS(before.lo), WORDS(after.hi) - WORDS(before.hi)};
-    #undef WORDS
+    Bytes a = __builtin_astype(after, Bytes), b = __builtin_astype(before, Bytes), signs = __builtin_astype((Int)(0xff01ff01), Bytes);
+    #define QUARTER(f, n) f(n), f(n + 1), f(n + 2), f(n + 3), f(n + 4), f(n + 5), f(n + 6), f(n + 7)
+    #define BOTH_OF(n) n, n + 64
+    #define UNPACKED(n) __builtin_shufflevector(a, b, QUARTER(BOTH_OF, n), QUARTER(BOTH_OF, n + 16), QUARTER(BOTH_OF, n + 32), QUARTER(BOTH_OF, n + 48))
+    Field f = {__builtin_ia32_pmaddubsw512(UNPACKED(0), signs), __builtin_ia32_pmaddubsw512(UNPACKED(8), signs)};
+    #undef UNPACKED
+    #undef BOTH_OF
+    #undef QUARTER
     return f;
 }
 
@@ -118,11 +130,9 @@ static inline Real3 narrow_gradient(constant const View *view, VOLUME voxels, co
     WideBlock b = wide_block_at(view, voxels + places->offset[k]);
     Int word = (i.z << 4) + (i.y << 2) + i.x + places->words[k], pair = (word | (word << 16)) + 0x10000;
     Int rows = wide_rows(&b, 0);
-    #define MOVED(...) __builtin_shufflevector(rows, b.beside, __VA_ARGS__)
     Field x = field_of(wide_rows(&b, 1), wide_rows(&b, -1));
-    Field y = field_of(MOVED(1, 2, 3, 20, 5, 6, 7, 21, 9, 10, 11, 22, 13, 14, 15, 23), MOVED(16, 0, 1, 2, 17, 4, 5, 6, 18, 8, 9, 10, 19, 12, 13, 14));
-    Field z = field_of(MOVED(4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 28, 29, 30, 31), MOVED(24, 25, 26, 27, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11));
-    #undef MOVED
+    Field y = field_of(ROW_AFTER(rows, b.beside), ROW_BEFORE(rows, b.beside));
+    Field z = field_of(SHEET_AFTER(rows, b.beside), SHEET_BEFORE(rows, b.beside));
     return real3(field_between(x, pair, &i), field_between(y, pair, &i), field_between(z, pair, &i));
 }
 #endif

@@ -8,8 +8,8 @@
 #if INTERPOLATION == TRILINEAR && VOXEL == VOXEL_U8 && !VOLUMES_ARE_IMAGES
 #define INNER_BYTES 1
 #define INNER_UNIT (1.0f / 32767.0f)
-// A place comes with 15 binary places.
-#define INNER_PLACES 32768.0f
+// A place comes with 16 binary places.
+#define INNER_PLACES 65536.0f
 
 #if LANES == 16 && defined(__AVX512BW__) && __has_builtin(__builtin_ia32_pmaddwd512)
 typedef short Words __attribute__((ext_vector_type(32)));
@@ -21,20 +21,19 @@ typedef Words Weights; // those of two voxels side by side in x
 #define MULTIPLY_ADD(a, b) __builtin_astype(__builtin_ia32_pmaddwd512(a, b), Int)
 // The bytes 0 and 1 of each lane as two words.
 #define PAIR_ORDER FOUR(0x80018000, 0x80058004, 0x80098008, 0x800d800c)
-// The low word of each lane in both.
+// The low word of each lane in both, and the high one.
 #define BOTH(v) SHUFFLE(v, FOUR(0x01000100, 0x05040504, 0x09080908, 0x0d0c0d0c))
+#define BOTH_HIGH(v) SHUFFLE(v, FOUR(0x03020302, 0x07060706, 0x0b0a0b0a, 0x0f0e0f0e))
 
 // Those at the fraction of x.
 static inline Weights weights_at(Int x) {
     // (1 - f, f) as words: (f & 0x7fff7fff) ^ 0x7fff in one instruction
-    Int f = __builtin_astype(BOTH(x), Int);
+    Int f = __builtin_astype(BOTH(x >> 1), Int);
     return AS_WORDS(__builtin_ia32_pternlogd512_mask(f, (Int)(0x7fff7fff), (Int)(0x7fff), 0x6a, (short)-1));
 }
 
 // The part of them that the fraction of `place` gives to the farther of two.
-static inline Weights farther(Weights w, Int place) {
-    return __builtin_ia32_pmulhrsw512(w, AS_WORDS(__builtin_astype(BOTH(place), Int) & 0x7fff7fff));
-}
+static inline Weights farther(Weights w, Int place) { return __builtin_ia32_pmulhuw512(w, BOTH(place)); }
 
 static inline Weights less(Weights w, Weights part) { return w - part; }
 
@@ -46,12 +45,12 @@ static inline Int product(Int small, int factor) { return MULTIPLY_ADD(AS_WORDS(
 typedef struct { Int a, b; } Weights;
 
 static inline Weights weights_at(Int x) {
-    Weights w = {0x7fff - (x & 0x7fff), x & 0x7fff};
+    Weights w = {0x7fff - ((x >> 1) & 0x7fff), (x >> 1) & 0x7fff};
     return w;
 }
 
 static inline Weights farther(Weights w, Int place) {
-    Weights part = {(w.a * (place & 0x7fff) + 0x4000) >> 15, (w.b * (place & 0x7fff) + 0x4000) >> 15};
+    Weights part = {(w.a * (place & 0xffff)) >> 16, (w.b * (place & 0xffff)) >> 16};
     return part;
 }
 
@@ -65,10 +64,7 @@ static inline Int weigh(Int word, int n, Weights w) { return ((word >> (8 * n)) 
 static inline Int product(Int small, int factor) { return small * factor; }
 #endif
 
-// Where a sample is: its lowest corner in whole voxels, and the weights of the four pairs of voxels around it.
-typedef struct { Int x, y, z; Weights near, next, far, beyond; } Inner;
-
-// A place or a way in whole parts of 2^-15 voxels.
+// A place or a way in whole parts of 2^-16 voxels.
 typedef struct { Int x, y, z; } Fixed3;
 
 static inline Fixed3 fixed3(Real3 p) {
@@ -83,9 +79,12 @@ static inline Fixed3 add_fixed3(Fixed3 a, Fixed3 b) {
     return sum;
 }
 
+// Where a sample is: its lowest corner in whole voxels, and the weights of the four pairs of voxels around it.
+typedef struct { Fixed3 at; Int x, y, z; Weights near, next, far, beyond; } Inner;
+
 static inline Inner inner_of(Fixed3 p) {
     Inner i;
-    i.x = p.x >> 15, i.y = p.y >> 15, i.z = p.z >> 15;
+    i.at = p, i.x = p.x >> 16, i.y = p.y >> 16, i.z = p.z >> 16;
     Weights all = weights_at(p.x), behind = farther(all, p.z), front = less(all, behind);
     i.next = farther(front, p.y), i.near = less(front, i.next);
     i.beyond = farther(behind, p.y), i.far = less(behind, i.beyond);

@@ -186,11 +186,14 @@ static inline Real inverse_root(Real v) {
 static inline Real inverse_root(Real v) { return rsqrt(v); }
 #endif
 
-// x^y for x in [0, 1] and y >= 0 by squares, which are a short chain; between whole numbers it is interpolated.
+// x^y for x in [0, 1] and y >= 1 by squares, from the highest binary place of y down; between whole numbers it is interpolated.
 static inline Real power(Real x, float y) {
-    int whole = (int)y;
-    Real result = mad((Real)(y - floor(y)), x - 1.0f, (Real)(1.0f));
-    for (; whole > 0; whole >>= 1, x *= x)
-        if (whole & 1) result *= x;
-    return result;
+    uint whole = (uint)y;
+    float part = y - (float)whole;
+    Real result = x;
+    for (uint place = 0x40000000u >> clz(whole); place > 0u; place >>= 1) {
+        result *= result;
+        if (whole & place) result *= x;
+    }
+    return part > 0.0f ? result * mad((Real)(part), x - 1.0f, (Real)(1.0f)) : result;
 }

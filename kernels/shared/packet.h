@@ -36,6 +36,7 @@ typedef struct {
 typedef struct {
     float origin[3], direction[3]; // middle of the samples of step k: origin + direction (k h), index units
     float reach[3];                // no sample of any lane is further from it
+    float steps[3];                // that it takes for a voxel along the axis
     int begin, end;                // steps in which any lane has a sample
 } Beam;
 
@@ -94,40 +95,37 @@ static inline Packet packet_at(constant const View *view, int left, int top, flo
     return p;
 }
 
-// How far a packet's rays are from the beam's middle ray at the ray parameter t, along one axis.
-static inline float reach_axis(Real origin, Real direction, float middle, float along, float t) {
-    return greatest_lane(fabs((origin - middle) + (direction - along) * t));
-}
-
 static inline Beam beam_at(constant const View *view, int number, float margin, Packet *packets) {
     int beams_wide = (view->width + TILE_W * BEAM_W - 1) / (TILE_W * BEAM_W);
     int left = (number % beams_wide) * TILE_W * BEAM_W, top = (number / beams_wide) * TILE_H * BEAM_H;
-    float near = 1e30f, far = -1e30f;
+    Real first = (Real)(1e30f), last = (Real)(-1e30f);
     for (int i = 0; i < PACKETS; i++) {
         packets[i] = packet_at(view, left + (i % BEAM_W) * TILE_W, top + (i / BEAM_W) * TILE_H, margin);
         Mask hit = MASK(packets[i].ray.t_far > packets[i].ray.t_near);
-        near = fmin(near, least_lane(select((Real)(1e30f), packets[i].ray.t_near, hit)));
-        far = fmax(far, greatest_lane(select((Real)(-1e30f), packets[i].ray.t_far, hit)));
+        first = fmin(first, select((Real)(1e30f), packets[i].ray.t_near, hit));
+        last = fmax(last, select((Real)(-1e30f), packets[i].ray.t_far, hit));
     }
+    float near = least_lane(first), far = greatest_lane(last);
     Beam b;
     b.begin = b.end = 0;
     if (!(far > near)) return b;
     b.begin = (int)floor(near / view->step);
     b.end = (int)ceil(far / view->step);
     RealLanes v;
+    Real apart;
     #define MIDDLE(to, first, last) v.v = 0.5f * (first + last); to = 0.5f * (v.lane[0] + v.lane[LANES - 1])
     // A sample lies anywhere in its step; the middle of the step stands for it.
     #define AXIS(i, c)                                                                                                     \
         MIDDLE(b.direction[i], packets[0].ray.direction.c, packets[PACKETS - 1].ray.direction.c);                          \
         MIDDLE(b.origin[i], packets[0].ray.origin.c, packets[PACKETS - 1].ray.origin.c);                                   \
-        b.reach[i] = 0.0f;                                                                                                 \
+        apart = (Real)(0.0f);                                                                                              \
         for (int j = 0; j < PACKETS; j++) {                                                                                \
-            Real o = packets[j].ray.origin.c, d = packets[j].ray.direction.c;                                              \
-            b.reach[i] = fmax(b.reach[i], reach_axis(o, d, b.origin[i], b.direction[i], near - view->step));               \
-            b.reach[i] = fmax(b.reach[i], reach_axis(o, d, b.origin[i], b.direction[i], far + view->step));                \
+            Real o = packets[j].ray.origin.c - b.origin[i], d = packets[j].ray.direction.c - b.direction[i];               \
+            apart = fmax(apart, fmax(fabs(o + d * (near - view->step)), fabs(o + d * (far + view->step))));                \
         }                                                                                                                  \
-        b.reach[i] += 0.505f * fabs(b.direction[i]) * view->step + 0.01f;                                                  \
-        b.origin[i] += b.direction[i] * 0.5f * view->step;
+        b.reach[i] = greatest_lane(apart) + 0.505f * fabs(b.direction[i]) * view->step + 0.01f;                            \
+        b.origin[i] += b.direction[i] * 0.5f * view->step;                                                                 \
+        b.steps[i] = 1.0f / fmax(fabs(b.direction[i]) * view->step, 1e-12f);
     AXIS(0, x)
     AXIS(1, y)
     AXIS(2, z)
@@ -136,32 +134,28 @@ static inline Beam beam_at(constant const View *view, int number, float margin, 
     return b;
 }
 
+// Three numbers as a vector; the fourth is the third again.
+#define FLOATS(v) (float4)((v)[0], (v)[1], (v)[2], (v)[2])
+
 // The steps from k on in which no lane's sample is in an occupied cell; 0 where the next may be.
 static inline int beam_leap(constant const View *view, const Beam *b, global const uchar *distances, int k) {
-    float at = (float)k * view->step, steps = 1e8f;
-    int cell[3], count[3];
-    float here[3];
-    for (int i = 0; i < 3; i++) {
-        here[i] = b->origin[i] + b->direction[i] * at;
-        count[i] = (view->dims[i] + CELL - 1) / CELL;
-        cell[i] = clamp((int)(here[i] * (1.0f / CELL)), 0, count[i] - 1);
-    }
-    int distance = distances[(cell[2] * count[1] + cell[1]) * count[0] + cell[0]];
+    float at = (float)k * view->step;
+    float4 here = FLOATS(b->origin) + FLOATS(b->direction) * at;
+    int4 count = ((int4)(view->dims[0], view->dims[1], view->dims[2], 1) + (CELL - 1)) / CELL, cell = clamp(convert_int4(here * (1.0f / CELL)), 0, count - 1);
+    int distance = distances[(cell.z * count.y + cell.y) * count.x + cell.x];
 #if TAPS == 4 || STYLED
     // A cubic reads a voxel further than the cells look.
     distance -= 1;
 #endif
     if (distance <= 0) return 0;
-    for (int i = 0; i < 3; i++) {
-        // The block of empty cells; beyond the box there is nothing either.
-        int first = cell[i] - distance + 1, last = cell[i] + distance;
-        float low = first <= 0 ? -1e8f : (float)(first * CELL), high = last >= count[i] ? 1e8f : (float)(last * CELL);
-        float back = here[i] - b->reach[i] - low, ahead = high - here[i] - b->reach[i], speed = b->direction[i];
-        if (back < 0.0f || ahead < 0.0f) return 0;
-        float room = (speed > 0.0f ? ahead : back) / fmax(fabs(speed) * view->step, 1e-12f);
-        steps = room < steps ? room : steps;
-    }
-    return (int)steps;
+    // The block of empty cells; beyond the box there is nothing either.
+    int4 first = cell - distance + 1, last = cell + distance;
+    float4 low = select(convert_float4(first * CELL), (float4)(-1e8f), first <= 0);
+    float4 high = select(convert_float4(last * CELL), (float4)(1e8f), last >= count);
+    float4 back = here - FLOATS(b->reach) - low, ahead = high - here - FLOATS(b->reach);
+    float4 least = fmin(back, ahead), room = select(back, ahead, FLOATS(b->direction) > 0.0f) * FLOATS(b->steps);
+    if (fmin(least.x, fmin(least.y, least.z)) < 0.0f) return 0;
+    return (int)fmin(fmin(room.x, 1e8f), fmin(room.y, room.z));
 }
 
 // The raw value at the sample of a step that is whole in every lane: inner <= k < inner_end.

@@ -7,26 +7,37 @@ static inline Real3 gradient_world(constant const View *view, Real3 g) {
                  mad(m[6], g.x, mad(m[7], g.y, m[8] * g.z)));
 }
 
-// What is constant along a ray of unit direction `ray`: for each light the unit vector half way to it.
+// What is constant along a ray of unit direction `ray`: for each light the unit vector half way to it, as a covector in index units,
+// whose product with a gradient in index units is that of the vectors in the world.
 static inline void half_ways(constant const View *view, Real3 ray, Real3 half_way[MAX_LIGHTS]) {
+    constant const float *m = view->world_gradient_from_index;
     for (int i = 0; i < view->lights; i++) {
         constant const float *d = view->light_direction + 3 * i;
         Real3 h = real3(d[0] - ray.x, d[1] - ray.y, d[2] - ray.z);
-        half_way[i] = scale3(h, rsqrt(fmax(dot3(h, h), (Real)(1e-12f))));
+        h = scale3(h, rsqrt(fmax(dot3(h, h), (Real)(1e-12f))));
+        half_way[i] = real3(mad(m[0], h.x, mad(m[3], h.y, m[6] * h.z)), mad(m[1], h.x, mad(m[4], h.y, m[7] * h.z)),
+                            mad(m[2], h.x, mad(m[5], h.y, m[8] * h.z)));
     }
 }
 
-// `colour` as lit on the world gradient n, which is in units of `unit`. Where the field is flat there is no surface to turn towards
-// the light: full diffuse, no highlight.
-static inline Real3 shade(constant const View *view, Real3 n, float unit, const Real3 half_way[MAX_LIGHTS], Real3 colour) {
-    Real squared = dot3(n, n);
-    Mask flat = MASK(!(squared > view->flat_squared / (unit * unit)));
+// The square of the magnitude in the world of a gradient in index units.
+static inline Real gradient_squared(constant const View *view, Real3 g) {
+    if (view->isotropic_squared > 0.0f) return dot3(g, g) * view->isotropic_squared;
+    Real3 n = gradient_world(view, g);
+    return dot3(n, n);
+}
+
+// `colour` as lit on the gradient g, in `unit` a voxel. Where the field is flat there is no surface to turn towards the light: full
+// diffuse, no highlight.
+static inline Real3 shade(constant const View *view, Real3 g, float unit, const Real3 half_way[MAX_LIGHTS], Real3 colour) {
+    Real squared = gradient_squared(view, g);
+    Mask flat = MASK(!(squared > view->flat_squared * (1.0f / (unit * unit))));
     Real scale = select(inverse_root(squared), (Real)(0.0f), flat);
     Real3 body = real3(view->ambient, view->ambient, view->ambient), shine = real3(0.0f, 0.0f, 0.0f);
     for (int i = 0; i < view->lights; i++) {
-        constant const float *d = view->light_direction + 3 * i, *lambert = view->lambert + 3 * i, *highlight = view->highlight + 3 * i;
-        Real facing = select(fabs(mad(n.x, d[0], mad(n.y, d[1], n.z * d[2]))) * scale, (Real)(1.0f), flat);
-        Real glint = power(fmin(fabs(dot3(n, half_way[i])) * scale, (Real)(1.0f)), view->shininess);
+        constant const float *d = view->light_index + 3 * i, *lambert = view->lambert + 3 * i, *highlight = view->highlight + 3 * i;
+        Real facing = select(fabs(mad(g.x, d[0], mad(g.y, d[1], g.z * d[2]))) * scale, (Real)(1.0f), flat);
+        Real glint = power(fmin(fabs(dot3(g, half_way[i])) * scale, (Real)(1.0f)), view->shininess);
         body = real3(mad(facing, lambert[0], body.x), mad(facing, lambert[1], body.y), mad(facing, lambert[2], body.z));
         shine = real3(mad(glint, highlight[0], shine.x), mad(glint, highlight[1], shine.y), mad(glint, highlight[2], shine.z));
     }

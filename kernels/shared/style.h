@@ -2,20 +2,20 @@
 // What a sample looks like beyond its transfer function: opacity by gradient and by angle, colour by curvature, light by tone
 // and through thin tissue. All of it is per sample, so it holds for any interpolation.
 
-typedef struct { Real3 gradient, normal, ray; Real magnitude, facing; Mask flat; Curvature bend; } Surface;
+typedef struct { Real3 gradient, slope, normal, ray; Real magnitude, facing; Mask flat; Curvature bend; } Surface;
 
-// The surface through p: `gradient` in raw values per world unit, `normal` towards lower values, `facing` = |normal . ray|.
+// The surface through p: `gradient` in raw values per world unit, `slope` in raw values per voxel, `normal` towards lower values, `facing` = |normal . ray|.
 static inline Surface surface_at(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels, Real3 p,
                                  Real3 ray, Real *raw) {
     Surface s;
     if (params->curvature_full > 0.0f) {
         Jet jet = b_spline_jet(view, voxels, p);
         *raw = jet.value;
-        s.gradient = gradient_world(view, jet.gradient);
+        s.slope = jet.gradient, s.gradient = gradient_world(view, s.slope);
         s.bend = curvature(view, s.gradient, congruent(view->world_gradient_from_index, jet.hessian));
     } else {
         *raw = sample_raw(view, voxels, p);
-        s.gradient = gradient_world(view, gradient_raw(view, voxels, p));
+        s.slope = gradient_raw(view, voxels, p), s.gradient = gradient_world(view, s.slope);
     }
     Real squared = dot3(s.gradient, s.gradient);
     s.flat = MASK(!(squared > view->flat_squared));
@@ -101,7 +101,7 @@ static inline Real3 styled_colour(constant const View *view, constant const Emis
     if (params->lit) {
         Real3 half_way[MAX_LIGHTS];
         half_ways(view, s->ray, half_way);
-        return shade(view, s->gradient, 1.0f, half_way, colour);
+        return shade(view, s->slope, 1.0f, half_way, colour);
     }
     return colour;
 }

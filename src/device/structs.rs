@@ -123,6 +123,8 @@ device_struct! {
         pub plane_index: [f32; 4 * PLANES],
         /// Row by row: world gradient = this × gradient in index units.
         pub world_gradient_from_index: [f32; 9],
+        /// The square of what a gradient's magnitude in index units is multiplied by, where it is the same in all directions; else 0.
+        pub isotropic_squared: f32,
         /// The square of the gradient (raw values per world unit) below which there is no telling where it points.
         pub flat_squared: f32,
         /// Weight of light from everywhere.
@@ -133,6 +135,8 @@ device_struct! {
         pub lights: i32,
         /// Towards each light, world space, unit length.
         pub light_direction: [f32; 3 * LIGHTS],
+        /// Its product with a gradient in index units is that of `light_direction` with the gradient in the world.
+        pub light_index: [f32; 3 * LIGHTS],
         /// Linear colour of each light times the weight of Lambert's term.
         pub lambert: [f32; 3 * LIGHTS],
         /// Linear colour of each light times the weight of the highlight.

@@ -155,12 +155,22 @@ impl Camera {
             // A gradient is a covector: it goes to the world by the transpose of index-from-world. The sign of the slope does
             // not matter, since lights are two-sided.
             world_gradient_from_index: volume.world_from_index().matrix3.inverse().to_cols_array().map(|v| v as f32),
+            isotropic_squared: isotropic_squared(volume),
             flat_squared: flat_squared(volume),
             jittered: 1,
             place: 0.5,
             ..View::default()
         }
     }
+}
+
+/// See [`View::isotropic_squared`].
+fn isotropic_squared(volume: &Volume) -> f32 {
+    let from_index = volume.world_from_index().matrix3.inverse();
+    let square = from_index * from_index.transpose();
+    let side = square.x_axis.x;
+    let even = (square - DMat3::from_diagonal(DVec3::splat(side))).abs_diff_eq(DMat3::ZERO, 1e-6 * side);
+    if even { side as f32 } else { 0.0 }
 }
 
 /// What rounding alone may make of a gradient, squared: values are interpolated to about 2^-15 of their range.

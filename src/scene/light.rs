@@ -118,6 +118,9 @@ impl LightRequest {
         for (i, light) in lights.iter().take(LIGHTS).enumerate() {
             let towards = light.direction.map_or(camera.towards_eye(), |d| DVec3::from(d).normalize());
             view.light_direction[3 * i..3 * i + 3].copy_from_slice(&towards.as_vec3().to_array());
+            let m = view.world_gradient_from_index;
+            let index = |axis: usize| (0..3).map(|i| towards[i] * f64::from(m[3 * i + axis])).sum::<f64>() as f32;
+            view.light_index[3 * i..3 * i + 3].copy_from_slice(&[0, 1, 2].map(index));
             let times = |weight: f64| light.color.map(|c| (weight * c) as f32);
             view.lambert[3 * i..3 * i + 3].copy_from_slice(&times(self.diffuse));
             view.highlight[3 * i..3 * i + 3].copy_from_slice(&times(self.specular));

@@ -16,10 +16,9 @@ const LEAST_SLACK: [f32; 2] = [1.0 / 262_144.0, 1.0 / 16_384.0];
 /// How far a colour may be off: an eighth of a level of 255.
 const COLOUR_SLACK: f32 = 1.0 / 2048.0;
 
-/// An entry as the kernel decodes it: channels from 1 on (see `CHANNEL` in `kernels/emission_absorption.cl`), opacity.
 #[derive(Clone, Copy)]
 struct Entry {
-    channels: [f32; 3],
+    color: [f32; 3],
     opacity: f32,
 }
 
@@ -30,7 +29,7 @@ struct Piece {
     /// The last entry up to which there is no opacity; before the first for none.
     empty: f32,
     opacity: [f32; 4],
-    channels: [[f32; 2]; 3],
+    color: [[f32; 2]; 3],
 }
 
 impl Piece {
@@ -45,12 +44,16 @@ impl Piece {
             a + (b - a) * (x - i as f64)
         };
         let opacity = |i| [place(i, 4), value(place(i, 4), &|e| e.opacity)];
-        let channel = |c: usize| move |i| [place(i, 2), value(place(i, 2), &|e| e.channels[c])];
+        let channel = |c: usize| {
+            let [base, slope] = polynomial(std::array::from_fn(|i| [place(i, 2), value(place(i, 2), &|e| e.color[c])]));
+            // Not below black at either end.
+            [base - base.min(base + slope * (last - first) as f32).min(0.0), slope]
+        };
         let mut piece = Self {
             first,
             empty: first as f32 - 1.0,
             opacity: polynomial(std::array::from_fn(opacity)),
-            channels: std::array::from_fn(|c| polynomial(std::array::from_fn(channel(c)))),
+            color: [channel(0), channel(1), channel(2)],
         };
         if entries[first].opacity == 0.0 {
             (piece.empty, piece.opacity[0]) = (first as f32, 0.0);
@@ -61,10 +64,10 @@ impl Piece {
     /// Whether every entry of `first..=last` is met closely enough; `least` is what an opacity may be off anyway.
     fn holds(&self, entries: &[Entry], last: usize, least: f32) -> bool {
         (self.first..=last).all(|i| {
-            let (Entry { channels, opacity }, x) = (entries[i], (i - self.first) as f32);
+            let (Entry { color, opacity }, x) = (entries[i], (i - self.first) as f32);
             let [c0, c1, c2, c3] = self.opacity;
             let off = (((c3 * x + c2) * x + c1) * x + c0 - opacity).abs();
-            let close = |c: usize| (self.channels[c][1] * x + self.channels[c][0] - channels[c]).abs() <= COLOUR_SLACK;
+            let close = |c: usize| (self.color[c][1] * x + self.color[c][0] - color[c]).abs() <= COLOUR_SLACK;
             off <= opacity * OPACITY_SLACK + least && (opacity == 0.0 || (0..3).all(close))
         })
     }
@@ -114,16 +117,9 @@ fn polynomial<const N: usize>(points: [[f64; 2]; N]) -> [f32; N] {
 /// The words that follow the table, in columns of [`PIECES`]: where each piece begins, up to where it is empty, and its
 /// coefficients. Pieces that there are not begin past the table; where it takes too many, all of them do.
 pub fn pieces(colours: &[([f64; 3], f64)]) -> Vec<u32> {
-    let entries: Vec<Entry> = colours
-        .iter()
-        .map(|&(color, opacity)| Entry {
-            channels: std::array::from_fn(|c| {
-                let part = if c < 2 { 65535.0 / 65536.0 } else { 4095.0 / 4096.0 };
-                (1.0 + color[c].clamp(0.0, 1.0) * part) as f32
-            }),
-            opacity: opacity.clamp(0.0, 1.0) as f32,
-        })
-        .collect();
+    let narrow = |v: f64| v.clamp(0.0, 1.0) as f32;
+    let entry = |&(color, opacity): &([f64; 3], f64)| Entry { color: color.map(narrow), opacity: narrow(opacity) };
+    let entries: Vec<Entry> = colours.iter().map(entry).collect();
     let greatest = entries.iter().map(|e| e.opacity).fold(0.0, f32::max);
     let least = LEAST_SLACK[0].min(LEAST_SLACK[1] * greatest);
     let (mut found, mut from) = (Vec::new(), 0);
@@ -142,6 +138,6 @@ pub fn pieces(colours: &[([f64; 3], f64)]) -> Vec<u32> {
     let mut words = column(&|p| p.first as f32, beyond);
     words.extend(column(&|p| p.empty, beyond));
     words.extend((0..4).flat_map(|i| column(&|p| p.opacity[i], 0.0)));
-    words.extend((0..6).flat_map(|i| column(&|p| p.channels[i / 2][i % 2], 0.0)));
+    words.extend((0..6).flat_map(|i| column(&|p| p.color[i / 2][i % 2], 0.0)));
     words
 }
