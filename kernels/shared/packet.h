@@ -159,7 +159,7 @@ static inline int beam_leap(constant const View *view, const Beam *b, global con
 }
 
 // The raw value at the sample of a step that is whole in every lane: inner <= k < inner_end.
-static inline Real whole_step_raw(constant const View *view, VOLUME voxels, const Packet *p, int k) {
+static inline __attribute__((always_inline)) Real whole_step_raw(constant const View *view, VOLUME voxels, const Packet *p, int k) {
     Real3 place = along(p->start, p->pace, (Real)((float)k));
 #ifdef NARROW
     if (k < p->narrow_end) return narrow_raw(view, voxels, place, p->low + p->low_pace * (float)k) * INNER_UNIT;

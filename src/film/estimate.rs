@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::rounds::SURE;
-use super::{Film, Samples};
+use super::{Film, Samples, luminance};
 
 /// The estimated error of a picture: root mean square over its pixels of the error of linear luminance, divided by the
 /// picture's mean luminance (absolute where that is 0). A part is null where it is not known apart from the others.
@@ -100,15 +100,11 @@ impl Film {
 
     /// Rays that ended early leave out what is behind: at most what is in front of it, times what still gets through.
     fn truncation(&self) -> f64 {
-        let ended = |i: usize| {
-            let through = 1.0 - f64::from(self.main.mean[4 * i + 3]);
-            if through <= 1.0 - self.opacity_threshold {
-                (through.max(0.0) * self.main.luminance(i)).powi(2)
-            } else {
-                0.0
-            }
+        let ended = |p: &[f32]| {
+            let through = 1.0 - f64::from(p[3]);
+            if through <= 1.0 - self.opacity_threshold { (through.max(0.0) * luminance(p)).powi(2) } else { 0.0 }
         };
-        ((0..self.main.pixels()).map(ended).sum::<f64>() / self.main.pixels().max(1) as f64).sqrt()
+        (self.main.sum(ended) / self.main.pixels().max(1) as f64).sqrt()
     }
 }
 

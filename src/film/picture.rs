@@ -2,8 +2,10 @@
 
 use std::borrow::Cow;
 
-use super::{ErrorEstimate, Film};
-use crate::error::{Error, Result};
+use rayon::prelude::*;
+
+use super::{ErrorEstimate, Film, PART};
+use crate::error::Result;
 use crate::frame;
 
 /// What is behind the volume.
@@ -36,12 +38,7 @@ impl Film {
     /// # Errors
     /// `Error::Internal` when the encoder fails.
     pub fn png(&self) -> Result<(Vec<u8>, ErrorEstimate, u64)> {
-        let (error, (bytes, clipped)) = std::thread::scope(|scope| {
-            let error = scope.spawn(|| self.error());
-            let picture = self.srgb8();
-            (error.join(), picture)
-        });
-        let error = error.map_err(|_| Error::internal("estimating the error panicked"))?;
+        let (error, (bytes, clipped)) = rayon::join(|| self.error(), || self.srgb8());
         Ok((frame::png(self.size, &bytes, self.description(&error))?, error, clipped))
     }
 
@@ -91,30 +88,38 @@ impl Film {
     /// The picture in sRGB bytes (IEC 61966-2-1), clipped at 1, and how many values were clipped: three a pixel, or four with
     /// an alpha that is not multiplied into them.
     pub fn srgb8(&self) -> (Vec<u8>, u64) {
-        let table = srgb_table();
-        let mut clipped = 0u64;
-        let mut encode = |v: f32| {
-            clipped += u64::from(v > 1.0);
-            table[(v.clamp(0.0, 1.0) * 65535.0 + 0.5) as usize]
-        };
         let pixels = self.rgba();
         let channels = if self.background == Background::Transparent { 4 } else { 3 };
         let mut out = vec![0u8; pixels.len() / 4 * channels];
-        for (p, out) in pixels.chunks_exact(4).zip(out.chunks_exact_mut(channels)) {
-            match self.background {
-                Background::Colour(behind) => {
-                    let [r, g, b] = over(p, behind);
-                    (out[0], out[1], out[2]) = (encode(r), encode(g), encode(b));
-                }
-                Background::Transparent => {
-                    let scale = if p[3] > 0.0 { 1.0 / p[3] } else { 0.0 };
-                    (out[0], out[1], out[2]) = (encode(p[0] * scale), encode(p[1] * scale), encode(p[2] * scale));
-                    out[3] = (p[3].clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
-                }
-            }
-        }
+        let parts = pixels.par_chunks(4 * PART).zip(out.par_chunks_mut(channels * PART));
+        let clipped = parts.map(|(pixels, out)| encode(pixels, self.background, out)).sum();
         (out, clipped)
     }
+}
+
+/// Writes the pixels' sRGB bytes; how many values were clipped.
+fn encode(pixels: &[f32], background: Background, out: &mut [u8]) -> u64 {
+    let table = srgb_table();
+    let mut clipped = 0;
+    let mut encode = |v: f32| {
+        clipped += u64::from(v > 1.0);
+        table[(v.clamp(0.0, 1.0) * 65535.0 + 0.5) as usize]
+    };
+    match background {
+        Background::Colour(behind) => {
+            for (p, out) in pixels.chunks_exact(4).zip(out.chunks_exact_mut(3)) {
+                out.copy_from_slice(&over(p, behind).map(&mut encode));
+            }
+        }
+        Background::Transparent => {
+            for (p, out) in pixels.chunks_exact(4).zip(out.chunks_exact_mut(4)) {
+                let scale = if p[3] > 0.0 { 1.0 / p[3] } else { 0.0 };
+                out[..3].copy_from_slice(&[p[0], p[1], p[2]].map(|v| encode(v * scale)));
+                out[3] = (p[3].clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
+            }
+        }
+    }
+    clipped
 }
 
 /// A premultiplied pixel over a colour.

@@ -71,9 +71,8 @@ impl SampleCounts {
         counts.non_finite_pixels = film.main.unknown_pixels() as u64;
         counts.fireflies = self.fireflies.into();
         counts.clamped_samples = self.clamped.into();
-        let kept = film.luminance_sum();
-        let all = kept + self.clamped_luminance;
-        counts.clamped_energy = if all > 0.0 { self.clamped_luminance / all } else { 0.0 };
+        let cut = self.clamped_luminance;
+        counts.clamped_energy = if cut > 0.0 { cut / (film.luminance_sum() + cut) } else { 0.0 };
         counts.broken_majorants = self.broken.into();
         counts.cut_paths = self.cut.into();
     }
