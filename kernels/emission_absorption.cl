@@ -112,11 +112,15 @@ static inline Optical on_pieces(global const Pieces *t, Span s, Real place) {
 // The transfer function at places in the table, with the opacity of a whole step; a NaN is empty.
 static inline Optical optical_at(global const uchar *table, Span s, int form, Real place) {
     Optical o;
+#if VOXEL == VOXEL_F32
+    Mask nan = MASK(place != place);
+    place = select(place, (Real)(0.0f), nan);
+#endif
     if (form == ON_PIECE) o = on_piece(PIECES_OF(table), s.first, place);
     else if (form == ON_PIECES) o = on_pieces(PIECES_OF(table), s, place);
-    else o = optical(entry_at(table, to_int(fmax(place, (Real)(0.0f)) + 0.5f)));
+    else o = optical(entry_at(table, to_int(place + 0.5f)));
 #if VOXEL == VOXEL_F32
-    o.alpha = select(o.alpha, (Real)(0.0f), MASK(place != place));
+    o.alpha = select(o.alpha, (Real)(0.0f), nan);
 #endif
     return o;
 }

@@ -10,6 +10,8 @@
 #define INNER_UNIT (1.0f / 32767.0f)
 // A place comes with 16 binary places.
 #define INNER_PLACES 65536.0f
+// What is cut off of a place, and of half of its product with a weight, is half of its last binary place on the average.
+#define INNER_ROUNDING 1.0f
 
 #if LANES == 16 && defined(__AVX512BW__) && __has_builtin(__builtin_ia32_pmaddwd512)
 typedef short Words __attribute__((ext_vector_type(32)));
@@ -106,28 +108,36 @@ static inline Real inner_raw(constant const View *view, VOLUME voxels, Real3 p) 
     #undef PAIR
 }
 
-// Value and gradient by central differences. Twelve gathers instead of the 28 of
-// seven values: a gather of four voxels in x serves three of them, and rows are shared.
+// Value and gradient by central differences, the gradient in floats beyond x. Twelve gathers instead of the 28 of seven values: a
+// gather of four voxels in x serves three of them, and rows are shared.
 static inline Real inner_gradient(constant const View *view, VOLUME voxels, Real3 p, Real3 *gradient) {
     Inner i = inner_at(p);
     Int at = inner_offset(view, i);
+    Weights all = weights_at(i.at.x);
+    Real fy = to_real(i.at.y & 0xffff) * 0x1p-16f, fz = to_real(i.at.z & 0xffff) * 0x1p-16f;
     int row = view->dims[0], sheet = view->dims[0] * view->dims[1];
     global const uchar *from = voxels - 1; // the lanes are a voxel or more inside
     #define ROW(y, z) gather_words(from + ((y) * row + (z) * sheet), at)
-    #define ALL(n, a, b, c, d) ((weigh(a, n, i.near) + weigh(b, n, i.next)) + (weigh(c, n, i.far) + weigh(d, n, i.beyond)))
-    Int a = ROW(0, 0), b = ROW(1, 0), c = ROW(0, 1), d = ROW(1, 1);
-    Int y0 = ROW(-1, 0), y1 = ROW(-1, 1), y2 = ROW(2, 0), y3 = ROW(2, 1);
-    Int z0 = ROW(0, -1), z1 = ROW(1, -1), z2 = ROW(0, 2), z3 = ROW(1, 2);
-    gradient->x = to_real(ALL(2, a, b, c, d) - ALL(0, a, b, c, d));
-    gradient->y = to_real(ALL(1, b, y2, d, y3) - ALL(1, y0, a, y1, c));
-    gradient->z = to_real(ALL(1, c, d, z2, z3) - ALL(1, z0, z1, a, b));
-    return to_real(ALL(1, a, b, c, d));
+    #define SLOPE(v) to_real(weigh(v, 2, all) - weigh(v, 0, all))
+    #define LINE(v) to_real(weigh(v, 1, all))
+    #define LERP(a, b, f) mad((b) - (a), f, a)
+    Int va = ROW(0, 0), vb = ROW(1, 0), vc = ROW(0, 1), vd = ROW(1, 1);
+    gradient->x = LERP(LERP(SLOPE(va), SLOPE(vc), fz), LERP(SLOPE(vb), SLOPE(vd), fz), fy);
+    Real a = LINE(va), b = LINE(vb), c = LINE(vc), d = LINE(vd);
+    Real before = LERP(LINE(ROW(-1, 0)), LINE(ROW(-1, 1)), fz), after = LERP(LINE(ROW(2, 0)), LINE(ROW(2, 1)), fz);
+    gradient->y = LERP(LERP(b, d, fz), after, fy) - LERP(before, LERP(a, c, fz), fy);
+    before = LERP(LINE(ROW(0, -1)), LINE(ROW(1, -1)), fy), after = LERP(LINE(ROW(0, 2)), LINE(ROW(1, 2)), fy);
+    gradient->z = LERP(LERP(c, d, fy), after, fz) - LERP(before, LERP(a, b, fy), fz);
     #undef ROW
-    #undef ALL
+    #undef SLOPE
+    #undef LINE
+    #undef LERP
+    return to_real((weigh(va, 1, i.near) + weigh(vb, 1, i.next)) + (weigh(vc, 1, i.far) + weigh(vd, 1, i.beyond)));
 }
 #else
 #define INNER_UNIT 1.0f
 #define INNER_PLACES 1.0f
+#define INNER_ROUNDING 0.0f
 
 static inline Real inner_raw(constant const View *view, VOLUME voxels, Real3 p) {
 #if INTERPOLATION != TRILINEAR || VOLUMES_ARE_IMAGES
@@ -152,4 +162,7 @@ static inline Real inner_gradient(constant const View *view, VOLUME voxels, Real
 
 // A place or a way in index units as inner_raw takes it: places count from the middle of voxel 0.
 static inline Real3 inner_way(Real3 way) { return scale3(way, (Real)(INNER_PLACES)); }
-static inline Real3 inner_place(Real3 p) { return inner_way(real3(p.x - 0.5f, p.y - 0.5f, p.z - 0.5f)); }
+static inline Real3 inner_place(Real3 p) {
+    Real3 place = inner_way(real3(p.x - 0.5f, p.y - 0.5f, p.z - 0.5f));
+    return real3(place.x + INNER_ROUNDING, place.y + INNER_ROUNDING, place.z + INNER_ROUNDING);
+}

@@ -141,3 +141,76 @@ pub fn pieces(colours: &[([f64; 3], f64)]) -> Vec<u32> {
     words.extend((0..6).flat_map(|i| column(&|p| p.color[i / 2][i % 2], 0.0)));
     words
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Entries of an opacity and a grey by place from 0 to 1.
+    fn entries(of: impl Fn(f64) -> (f64, f64)) -> Vec<([f64; 3], f64)> {
+        let entry = |i: usize| of(i as f64 / (TABLE_SIZE - 1) as f64);
+        (0..TABLE_SIZE).map(entry).map(|(opacity, grey)| ([grey; 3], opacity)).collect()
+    }
+
+    /// What the device makes of an entry's number: opacity and red.
+    fn seen(words: &[u32], x: f32) -> (f32, f32) {
+        let column = |c: usize, i: usize| f32::from_bits(words[c * PIECES + i]);
+        let i = (0..PIECES).rfind(|&i| x >= column(0, i)).expect("a piece");
+        let t = x - column(0, i);
+        let opacity = (2..6).rfold(0.0, |sum, c| sum * t + column(c, i));
+        (opacity, column(7, i) * t + column(6, i))
+    }
+
+    fn count(words: &[u32]) -> usize {
+        (0..PIECES).filter(|&i| f32::from_bits(words[i]) < TABLE_SIZE as f32).count()
+    }
+
+    #[test]
+    fn pieces_are_the_function_at_every_entry() {
+        let ramp = |x: f64| (1.0 - (-0.9 * x).exp(), 0.2 + 0.5 * x);
+        let kinks = |x: f64| (if x < 0.31 { 0.0 } else { 0.4 * (x - 0.31) }, (x - 0.5).abs());
+        let opaque = |x: f64| (1.0 - (-80.0 * (x - 0.7).max(0.0)).exp(), 1.0 - x);
+        let fog = |x: f64| (1e-6 * x, 1.0);
+        for (what, of, most) in [
+            ("ramp", &ramp as &dyn Fn(f64) -> (f64, f64), 2),
+            ("kinks", &kinks, 5),
+            ("opaque", &opaque, 12),
+            ("fog", &fog, 1),
+        ] {
+            let entries = entries(of);
+            let words = pieces(&entries);
+            assert!((1..=most).contains(&count(&words)), "{what}: {} pieces", count(&words));
+            let greatest = entries.iter().map(|e| e.1).fold(0.0, f64::max);
+            for (i, (color, opacity)) in entries.iter().enumerate() {
+                let (alpha, red) = seen(&words, i as f32);
+                let off = (f64::from(alpha) - opacity).abs();
+                assert!(
+                    off <= opacity / 2000.0 + (greatest / 16_000.0).min(4e-6),
+                    "{what}: {alpha} for {opacity} at {i}"
+                );
+                assert!(
+                    *opacity == 0.0 || (f64::from(red) - color[0]).abs() < 6e-4,
+                    "{what}: {red} for {} at {i}",
+                    color[0]
+                );
+                assert!(red >= 0.0, "{what}: {red} at {i}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_has_no_opacity_has_none_to_the_last_bit() {
+        let words = pieces(&entries(|x| {
+            (if (0.25..0.75).contains(&x) { 0.0 } else { (x - 0.25).abs().min((x - 0.75).abs()) }, 0.5)
+        }));
+        for i in (0..TABLE_SIZE).filter(|i| (0.25..0.75).contains(&(*i as f64 / (TABLE_SIZE - 1) as f64))) {
+            assert_eq!(seen(&words, i as f32).0, 0.0, "at {i}");
+        }
+    }
+
+    #[test]
+    fn what_takes_too_many_pieces_has_none() {
+        let comb = entries(|x| (0.5 + 0.5 * (200.0 * x).sin(), 0.5));
+        assert_eq!(count(&pieces(&comb)), 0);
+    }
+}
