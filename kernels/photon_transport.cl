@@ -90,7 +90,7 @@ static inline Mask cross_wall(constant const FieldPass *pass, constant const Pho
 }
 
 // Collisions in the lanes of `hit`: tells the real ones, deposits, plays the roulette, scatters. Returns the photons that go on.
-static inline Mask collide(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table, Grid grid,
+static inline Mask collide(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table, Grid *grid,
                            global ulong *ledger, uint item_first, Real rate, Int medium, Mask hit, Photon *photon, Gains *gains) {
     UInt4Lanes r = draw(pass, photon, item_first, 0);
     photon->depth = select(photon->depth, -log(unit_open(r.c)), hit);
@@ -158,7 +158,8 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
     if ((ulong)item * pass->per_item >= pass->count) return;
     // The last item of a launch may have fewer photons: never one too many.
     int share = (int)min(pass->count - item_first, pass->per_item), taken = 0;
-    Grid own = {grid + (pass->own_grids ? (size_t)item * params->grid[0] * params->grid[1] * params->grid[2] : 0), pass->own_grids};
+    int voxels = params->grid[0] * params->grid[1] * params->grid[2];
+    Grid sums = grid_at(grid + (pass->own_grids ? (size_t)item * voxels : 0), pass->own_grids, voxels);
 
     Photon photon;
     photon.p = photon.d = real3(0.0f, 0.0f, 0.0f);
@@ -240,9 +241,9 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
 #if VOXEL_WALLS
             Real amount = photon.weight * t * params->deposit_scale;
             if (params->tally == TALLY_ABSORBED_TRACK) amount *= rate * (1.0f - medium_number(params, table, medium, 1));
-            grid_add(own, cell_voxel(params, photon.cell), amount, alive);
+            grid_add(&sums, cell_voxel(params, photon.cell), amount, alive);
 #else
-            deposit_track(params, table, own, photon.p, photon.d, t, photon.weight, alive);
+            deposit_track(params, table, &sums, photon.p, photon.d, t, photon.weight, alive);
 #endif
         }
         photon.p = select3(photon.p, along(photon.p, photon.d, t), alive);
@@ -263,7 +264,7 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
             // The medium is that of the place which the photon has come to.
             medium = medium_of(params, table, photon.cell, photon.p);
 #endif
-            goes_on = collide(pass, params, table, own, ledger, item_first, rate, medium, hit, &photon, &gains);
+            goes_on = collide(pass, params, table, &sums, ledger, item_first, rate, medium, hit, &photon, &gains);
         }
         steps += 1;
         alive &= ~gone & (goes_on | ~hit);
@@ -274,6 +275,7 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
             alive &= ~fault;
         }
     }
+    if (sums.own) grid_flush(&sums);
     tally_fixed(ledger, (Int)(LEDGER_ABSORBED), gains.absorbed, (Mask)(-1));
     tally_fixed(ledger, (Int)(LEDGER_LOST), gains.lost, (Mask)(-1));
     tally_fixed(ledger, (Int)(LEDGER_SPECULAR), gains.specular, (Mask)(-1));

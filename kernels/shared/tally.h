@@ -11,14 +11,6 @@ static inline void tally_fixed(global ulong *sums, Int cell, ULong amount, Mask 
         if (on.lane[i]) atom_add(&sums[to.lane[i]], value.lane[i]);
 }
 
-// The same where nobody else adds to these sums: without atomics, and without branches.
-static inline void tally_own(global ulong *sums, Int cell, ULong amount, Mask active) {
-    IntLanes to;
-    ULongLanes value;
-    to.v = select((Int)(0), cell, active), value.v = amount & as_ULong(to_long(active));
-    for (int i = 0; i < LANES; i++) sums[to.lane[i]] += value.lane[i];
-}
-
 static inline void tally(global ulong *sums, Int cell, Real amount, Mask active) { tally_fixed(sums, cell, fixed(amount), active); }
 
 // A number of the ledger that most collisions add to: kept in registers and added once, for all cores would wait for its place.
