@@ -91,8 +91,7 @@ static inline Mask cross_wall(constant const FieldPass *pass, constant const Pho
 
 // Collisions in the lanes of `hit`: tells the real ones, deposits, plays the roulette, scatters. Returns the photons that go on.
 static inline Mask collide(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table, Grid *grid,
-                           global ulong *ledger, uint item_first, Real rate, Int medium, Mask hit, Photon *photon, Gains *gains) {
-    UInt4Lanes r = draw(pass, photon, item_first, 0);
+                           global ulong *ledger, uint item_first, UInt4Lanes r, Real rate, Int medium, Mask hit, Photon *photon, Gains *gains) {
     photon->depth = select(photon->depth, -log(unit_open(r.c)), hit);
     Mask real = hit;
     Medium m = medium_all(params, table, medium);
@@ -210,6 +209,7 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
         }
 
         Int medium = medium_of(params, table, photon.cell, photon.p);
+        UInt4Lanes random = draw(pass, &photon, item_first, 0);
         Real rate = collision_rate(params, table, medium, photon.cell, photon.p);
 #if GAMMA
         rate = attenuation_at(params, table, medium, photon.energy).extinction;
@@ -264,7 +264,7 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
             // The medium is that of the place which the photon has come to.
             medium = medium_of(params, table, photon.cell, photon.p);
 #endif
-            goes_on = collide(pass, params, table, &sums, ledger, item_first, rate, medium, hit, &photon, &gains);
+            goes_on = collide(pass, params, table, &sums, ledger, item_first, random, rate, medium, hit, &photon, &gains);
         }
         steps += 1;
         alive &= ~gone & (goes_on | ~hit);
