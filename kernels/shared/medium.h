@@ -64,7 +64,8 @@ static inline Int medium_of(constant const PhotonTransport *params, global const
     return LAYER_WALLS ? c.z : layer_at(params, table, p.z);
 #elif GEOMETRY == LABELS
     Int voxel = VOXEL_WALLS ? cell_voxel(params, c) : voxel_at(params, p);
-    return to_int(gather_reals(table + params->at_voxels, voxel));
+    Int word = gather_words((global const uchar *)(table + params->at_voxels), voxel * params->label_bytes);
+    return word & (params->label_bytes == 1 ? 0xff : 0xffff);
 #else
     return (Int)(0);
 #endif

@@ -55,6 +55,8 @@ device_struct! {
         pub at_layers: i32,
         /// Labels or densities of the voxels.
         pub at_voxels: i32,
+        /// Bytes of a label: 1 or 2.
+        pub label_bytes: i32,
         /// Majorants of the blocks.
         pub at_blocks: i32,
         /// Edges of the histogram's radii.

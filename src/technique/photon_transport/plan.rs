@@ -176,7 +176,16 @@ impl Simulation {
                 let ends = ends.iter().map(|e| if e.is_finite() { *e as f32 } else { ENDLESS_MM });
                 device.at_layers = append(&mut table, std::iter::once(0.0).chain(ends));
             }
-            Where::Labels(labels) => device.at_voxels = append(&mut table, labels.iter().map(|l| f32::from(*l))),
+            Where::Labels(labels) => {
+                // As bytes where they fit, so that more of them are near; a word more, for words are read from any byte on.
+                let small = g.media.len() <= 256;
+                let mut bytes: Vec<u8> =
+                    labels.iter().flat_map(|l| l.to_le_bytes().into_iter().take(if small { 1 } else { 2 })).collect();
+                bytes.resize(bytes.len().next_multiple_of(4) + 4, 0);
+                let words = bytes.chunks_exact(4).map(|w| f32::from_le_bytes([w[0], w[1], w[2], w[3]]));
+                device.at_voxels = append(&mut table, words);
+                device.label_bytes = if small { 1 } else { 2 };
+            }
             Where::Density(density) => device.at_voxels = append(&mut table, density.iter().copied()),
         }
         if g.is_gamma() {
