@@ -208,7 +208,9 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
             continue;
         }
 
-        Int medium = medium_of(params, table, photon.cell, photon.p);
+        // Between blocks' walls the medium counts at collisions alone, where no face bends light.
+        Int medium = (Int)(0);
+        if (!BLOCK_WALLS || GAMMA || params->mismatch) medium = medium_of(params, table, photon.cell, photon.p);
         UInt4Lanes random = draw(pass, &photon, item_first, 0);
         Real rate = collision_rate(params, table, medium, photon.cell, photon.p);
 #if GAMMA
