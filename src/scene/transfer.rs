@@ -7,7 +7,7 @@ use super::presets;
 use crate::error::{Error, Result, Violation};
 use crate::volume::Volume;
 
-/// Entries of the table that the device reads. `TABLE_SIZE` in `kernels/emission_absorption.cl`.
+/// Entries of the table that the device reads. `TABLE_SIZE` in `kernels/shared/optical.h`.
 pub const TABLE_SIZE: usize = 4096;
 /// The optical depth that a preset's opacity 1 has across the volume's mean side: nearly opaque, still soft.
 const PRESET_OPTICAL_DEPTH: f64 = 24.0;
@@ -265,7 +265,7 @@ impl TransferFunction {
     }
 }
 
-/// A colour and an opacity in two words, as `optical` in `kernels/emission_absorption.cl` takes them apart: the float of the opacity, rounded to 13 bits after the point, with blue in its ten
+/// A colour and an opacity in two words, as `optical` in `kernels/shared/optical.h` takes them apart: the float of the opacity, rounded to 13 bits after the point, with blue in its ten
 /// lowest and two highest bits; then red and green, turned to where a float's fraction has them.
 pub(crate) fn pack(color: [f64; 3], opacity: f64) -> [u32; 2] {
     let bits = |c: f64, most: f64| (c.clamp(0.0, 1.0) * most).round() as u32;

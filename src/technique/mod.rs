@@ -43,6 +43,7 @@ pub(crate) const VIEW_HEADERS: &[&str] = &[
     "shared/inner.h",
     "shared/block.h",
     "shared/packet.h",
+    "shared/optical.h",
     "shared/shade.h",
     "shared/curvature.h",
     "shared/style.h",

@@ -7,7 +7,7 @@
 
 use crate::scene::transfer::TABLE_SIZE;
 
-/// Most pieces: lanes of a register. `PIECES` in `kernels/emission_absorption.cl`.
+/// Most pieces: lanes of a register. `PIECES` in `kernels/shared/optical.h`.
 pub const PIECES: usize = 16;
 /// How far an opacity may be off in parts of itself, so that a picture is by no more.
 const OPACITY_SLACK: f32 = 1.0 / 2048.0;

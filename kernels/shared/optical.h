@@ -1,0 +1,135 @@
+// The transfer function on the device: a table of colours and opacities by value, and behind it the few polynomials that take its place
+// where it is smooth but for some kinks.
+#define TABLE_SIZE 4096
+
+typedef struct { Real3 colour; Real alpha; } Optical;
+
+// An entry of the table is two words: the opacity's float less its ten lowest bits, which hold the upper bits of blue, its two
+// lowest above (an opacity is at most 1); then 16 bits each of red and green, turned right by 25 and 9 bits.
+typedef struct { Int word, red_green; } Entry;
+
+static inline Entry entry_at(global const uchar *table, Int index) {
+    Entry e;
+    gather_pairs(table, index, &e.word, &e.red_green);
+    return e;
+}
+
+static inline Optical optical(Entry e) {
+    Optical o;
+    o.alpha = as_Real(e.word & 0x3ffffc00);
+    Int green = as_Int(rotate(as_UInt(e.red_green), (UInt)(16u))), blue = as_Int(rotate(as_UInt(e.word), (UInt)(13u)));
+    // The bits of a channel are those of the fraction of a float of 1 to 2.
+    #define CHANNEL(bits, mask, most) ((as_Real(((bits) & (mask)) | 0x3f800000) - 1.0f) * ((most + 1.0f) / most))
+    o.colour = real3(CHANNEL(e.red_green, 0x007fff80, 65535.0f), CHANNEL(green, 0x007fff80, 65535.0f), CHANNEL(blue, 0x007ff800, 4095.0f));
+    #undef CHANNEL
+    return o;
+}
+
+// Where a raw value in units of `unit` is in the table: entry i is at i. NaN where the value is.
+static inline Real place_of(constant const EmissionAbsorption *params, Real raw, float unit) {
+    Real x = mad(raw, (Real)(params->table_scale * unit), (Real)(params->table_offset - 0.5f));
+    Real place = clamp(x, (Real)(0.0f), (Real)(TABLE_SIZE - 1));
+#if VOXEL == VOXEL_F32
+    place = select(place, raw, MASK(raw != raw));
+#endif
+    return place;
+}
+
+// What follows the table of a function that is smooth but for some kinks: where its pieces begin, up to where each has no opacity,
+// and their polynomials, a cubic for the opacity and a line for each colour (src/technique/emission_absorption/pieces.rs).
+#define PIECES 16
+typedef struct { float start[PIECES], empty[PIECES], opacity[4][PIECES], colour[3][2][PIECES]; } Pieces;
+
+#define PIECES_OF(table) ((global const Pieces *)((table) + 8 * TABLE_SIZE))
+
+// The piece that a place is on; -1 where there are none.
+static inline int piece_at(global const Pieces *t, float place) {
+#if LANES == 16
+    return count_lanes(MASK((Real)(place) >= *(global const Real *)t->start)) - 1;
+#else
+    int piece = -1;
+    while (piece < PIECES - 1 && place >= t->start[piece + 1]) piece++;
+    return piece;
+#endif
+}
+
+// The pieces that a set of samples lies on.
+typedef struct { int first, last; bool empty; } Span;
+
+static inline Span span_of(global const uchar *table, float least, float greatest) {
+    global const Pieces *t = PIECES_OF(table);
+    Span s;
+    s.first = piece_at(t, least), s.last = piece_at(t, greatest);
+    s.empty = !(least <= greatest) || (s.first >= 0 && s.first == s.last && greatest <= t->empty[s.first]);
+    return s;
+}
+
+#define ON_TABLE 0
+#define ON_PIECE 1
+#define ON_PIECES 2
+
+static inline int form_of(Span s) { return s.first < 0 ? ON_TABLE : s.first == s.last ? ON_PIECE : ON_PIECES; }
+
+#define POLYNOMIALS(PART)                                                                                                   \
+    Real x = place - PART(t->start);                                                                                        \
+    Real alpha = mad(mad(mad(PART(t->opacity[3]), x, PART(t->opacity[2])), x, PART(t->opacity[1])), x, PART(t->opacity[0])); \
+    o.alpha = LESSER(alpha, (Real)(1.0f));                                                                                  \
+    o.colour = real3(mad(PART(t->colour[0][1]), x, PART(t->colour[0][0])), mad(PART(t->colour[1][1]), x, PART(t->colour[1][0])), \
+                     mad(PART(t->colour[2][1]), x, PART(t->colour[2][0])));
+
+// The transfer function where all lanes are on one piece.
+static inline Optical on_piece(global const Pieces *t, int piece, Real place) {
+    Optical o;
+    #define PART(column) (Real)((column)[piece])
+    POLYNOMIALS(PART)
+    #undef PART
+    return o;
+}
+
+// The same where they are on several.
+static inline Optical on_pieces(global const Pieces *t, Span s, Real place) {
+#if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_permvarsf512)
+    Int piece = (Int)(s.first);
+    for (int i = s.first + 1; i <= s.last; i++) piece -= MASK(place >= t->start[i]);
+    Optical o;
+    #define PART(column) __builtin_ia32_permvarsf512(*(global const Real *)(column), piece)
+    POLYNOMIALS(PART)
+    #undef PART
+#else
+    Optical o = on_piece(t, s.first, place);
+    for (int i = s.first + 1; i <= s.last; i++) {
+        Mask there = MASK(place >= t->start[i]);
+        Optical next = on_piece(t, i, place);
+        o.alpha = select(o.alpha, next.alpha, there), o.colour = select3(o.colour, next.colour, there);
+    }
+#endif
+    return o;
+}
+
+// The transfer function at places in the table, with the opacity of a whole step; a NaN is empty.
+static inline Optical optical_at(global const uchar *table, Span s, int form, Real place) {
+    Optical o;
+#if VOXEL == VOXEL_F32
+    Mask nan = MASK(place != place);
+    place = select(place, (Real)(0.0f), nan);
+#endif
+    if (form == ON_PIECE) o = on_piece(PIECES_OF(table), s.first, place);
+    else if (form == ON_PIECES) o = on_pieces(PIECES_OF(table), s, place);
+    else o = optical(entry_at(table, to_int(place + 0.5f)));
+#if VOXEL == VOXEL_F32
+    o.alpha = select(o.alpha, (Real)(0.0f), nan);
+#endif
+    return o;
+}
+
+// The same at a raw value in units of `unit`.
+static inline Optical classify(constant const EmissionAbsorption *params, global const uchar *table, Real raw, float unit) {
+    Real place = place_of(params, raw, unit);
+#if VOXEL == VOXEL_F32
+    Mask nan = MASK(place != place);
+    Span s = span_of(table, least_lane(select(place, (Real)(INFINITY), nan)), greatest_lane(select(place, (Real)(-INFINITY), nan)));
+#else
+    Span s = span_of(table, least_lane(place), greatest_lane(place));
+#endif
+    return optical_at(table, s, form_of(s), place);
+}
