@@ -4,12 +4,10 @@
 // next is: meanwhile its places come from memory. They are all over the grid, and waiting for them took a third of the time.
 typedef struct { global ulong *sums; int own; Int idle; IntLanes to; ULongLanes amount; } Grid;
 
-#if LANES > 1 && defined(__has_builtin)
-#if __has_builtin(__builtin_prefetch)
+// Clang for a processor knows how; oclgrind, which is for none, does not.
+#if LANES > 1 && (defined(__x86_64__) || defined(__aarch64__))
 #define FETCH_TO_WRITE(address) __builtin_prefetch((const void *)(size_t)(address), 1)
-#endif
-#endif
-#ifndef FETCH_TO_WRITE
+#else
 #define FETCH_TO_WRITE(address)
 #endif
 
