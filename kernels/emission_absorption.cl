@@ -3,13 +3,6 @@
 
 typedef struct { Real3 colour; Real transmittance; } Radiance;
 
-#if SHADED
-// The colour of a sample of gradient g, in `unit` a voxel, under the lights.
-static inline Real3 lit(constant const View *view, const Packet *p, Real3 g, float unit, Real3 colour) {
-    return shade(view, g, unit, p->half_way, colour);
-}
-#endif
-
 // Puts a sample behind (or, back to front, before) what is there, in the lanes whose ray has not ended.
 static inline void composite(constant const EmissionAbsorption *params, Optical o, Radiance *r) {
 #if BACK_TO_FRONT
@@ -135,7 +128,7 @@ static inline void see(constant const View *view, constant const EmissionAbsorpt
 #if SHADED
         here = at, at = add_fixed3(at, pace);
         if (!any_lane(MASK(o.alpha > 0.0f))) continue;
-        o.colour = lit(view, p, narrow_gradient(view, voxels, &places, i, inner_of(here)), GRADIENT_UNIT, o.colour);
+        o.colour = shade(view, narrow_gradient(view, voxels, &places, i, inner_of(here)), GRADIENT_UNIT, p->half_way, o.colour);
 #endif
         composite(params, o, r);
     }
@@ -168,7 +161,7 @@ static inline void inner_step(constant const View *view, constant const Emission
     Real3 g;
     Optical o = classify(params, table, inner_gradient(view, voxels, at, &g), INNER_UNIT);
     if (!any_lane(MASK(o.alpha > 0.0f))) return;
-    o.colour = lit(view, p, g, GRADIENT_UNIT, o.colour);
+    o.colour = shade(view, g, GRADIENT_UNIT, p->half_way, o.colour);
 #else
     Optical o = classify(params, table, inner_raw(view, voxels, at), INNER_UNIT);
 #endif
@@ -187,7 +180,7 @@ static inline void edge_step(constant const View *view, constant const EmissionA
     o.alpha = select((Real)(0.0f), select(part, o.alpha, MASK(length >= view->step)), inside);
     if (!any_lane(MASK(o.alpha > 0.0f))) return;
 #if SHADED
-    o.colour = lit(view, p, gradient_raw(view, voxels, at), 1.0f, o.colour);
+    o.colour = shade(view, gradient_raw(view, voxels, at), 1.0f, p->half_way, o.colour);
 #endif
     composite(params, o, r);
 }

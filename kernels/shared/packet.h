@@ -55,9 +55,9 @@ static inline void narrow_range(constant const View *view, Packet *p) {
         {                                                                                                                  \
             Real a = p->start.c + p->pace.c * from, b = a + p->pace.c * steps;                                             \
             float low_a = least_lane(a), low_b = least_lane(b), wide_a = greatest_lane(a) - low_a, wide_b = greatest_lane(b) - low_b; \
-            float spare = NARROW * INNER_PLACES - wide_a, growth = (wide_b - wide_a) / steps;                                     \
-            pace[i] = (low_b - low_a) / (steps * INNER_PLACES);                                                                 \
-            low[i] = low_a / INNER_PLACES - pace[i] * from - 0.01f;                                                           \
+            float spare = NARROW * INNER_PLACES - wide_a, growth = (wide_b - wide_a) / steps;                              \
+            pace[i] = (low_b - low_a) / (steps * INNER_PLACES);                                                            \
+            low[i] = low_a / INNER_PLACES - pace[i] * from - 0.01f;                                                        \
             room = spare < 0.0f ? 0.0f : growth * room > spare ? spare / growth : room;                                    \
         }
     AXIS(0, x)
@@ -141,7 +141,8 @@ static inline Beam beam_at(constant const View *view, int number, float margin, 
 static inline int beam_leap(constant const View *view, const Beam *b, global const uchar *distances, int k) {
     float at = (float)k * view->step;
     float4 here = FLOATS(b->origin) + FLOATS(b->direction) * at;
-    int4 count = ((int4)(view->dims[0], view->dims[1], view->dims[2], 1) + (CELL - 1)) / CELL, cell = clamp(convert_int4(here * (1.0f / CELL)), 0, count - 1);
+    int4 count = ((int4)(view->dims[0], view->dims[1], view->dims[2], 1) + (CELL - 1)) / CELL;
+    int4 cell = clamp(convert_int4(here * (1.0f / CELL)), 0, count - 1);
     int distance = distances[(cell.z * count.y + cell.y) * count.x + cell.x];
 #if TAPS == 4 || STYLED
     // A cubic reads a voxel further than the cells look.

@@ -265,8 +265,9 @@ impl TransferFunction {
     }
 }
 
-/// A colour and an opacity in two words, as `optical` in `kernels/shared/optical.h` takes them apart: the float of the opacity, rounded to 13 bits after the point, with blue in its ten
-/// lowest and two highest bits; then red and green, turned to where a float's fraction has them.
+/// A colour and an opacity in two words, as `optical` in `kernels/shared/optical.h` takes them apart: the float of the opacity,
+/// rounded to 13 bits after the point, with blue in its ten lowest and two highest bits; then red and green, turned to where a
+/// float's fraction has them.
 pub(crate) fn pack(color: [f64; 3], opacity: f64) -> [u32; 2] {
     let bits = |c: f64, most: f64| (c.clamp(0.0, 1.0) * most).round() as u32;
     let [red, green, blue] = [bits(color[0], 65535.0), bits(color[1], 65535.0), bits(color[2], 4095.0)];
