@@ -110,7 +110,9 @@ fn what_a_variant_does_without_is_not_in_its_program() {
     let source = (technique::find("emission_absorption").unwrap().source)();
     for variant in (source.variants)() {
         let text = preprocessed(&source, &variant);
-        for (feature, code) in [("SHADED", "Real3 lit("), ("STYLED", "styled_step("), ("PREINTEGRATED", "integral(")] {
+        for (feature, code) in
+            [("SHADED", "o.colour = shade("), ("STYLED", "styled_step("), ("PREINTEGRATED", "integral(")]
+        {
             let wanted = variant.features.contains(&(feature, 1));
             assert_eq!(text.contains(code), wanted, "{}: {code}", variant.label());
         }
