@@ -4,90 +4,14 @@
 // One work-item carries a packet of photons; a lane whose photon has ended takes the next of the item's. On a CPU one item of each
 // work-group works and has a grid of its own, for atomics take a third of the time.
 
-#define LEDGER_EXIT 0 // -x, +x, -y, +y, -z, +z
-#define LEDGER_ABSORBED 6
-#define LEDGER_LOST 7
-#define LEDGER_SPECULAR 8
-#define LEDGER_GATED 9
-#define LEDGER_UNSCATTERED 10 // -z, +z
-#define LEDGER_SCATTERINGS 12 // a count, like the next three
-#define LEDGER_FAULTS 13
-#define LEDGER_BROKEN 14
-#define LEDGER_MISSED 15
-#define LEDGER_PATH 16 // in units of params->path_unit_mm
-#define LEDGER_BINS 17 // -z by radius and angle, then +z
-
-// Lanes that are free before photons are launched: a launch costs as much as a few of them idle for a step or two.
-#define REFILL (LANES / 8 + 1)
+// Whether photons are launched into so many free lanes. A launch costs about a step of all lanes: if each fills f of them, and photons
+// live n steps, then LANES / (n f) of the time goes into launches and (f - 1) / (2 LANES) is lost to free lanes, the least together
+// where f^2 is 2 LANES^2 / n. So far n is LANES times the steps that have passed over the photons taken.
+static inline int is_launch_due(int free, int taken, int passed) {
+    return free == LANES || (float)(free * free) * (float)passed >= 2.0f * LANES * (float)taken;
+}
 
 typedef struct { ULong absorbed, lost, specular; UInt scatterings; Real path; } Gains;
-
-// Counts what leaves the box by a face, by its radius from the beam's axis and its angle to the face.
-static inline void leave(constant const PhotonTransport *params, global const float *table, global ulong *ledger, const Photon *photon,
-                         int axis, Mask up, Mask gone) {
-    tally(ledger, select((Int)(LEDGER_EXIT + 2 * axis), (Int)(LEDGER_EXIT + 2 * axis + 1), up), photon->weight, gone);
-    if (axis != 2) return;
-    Int side = select((Int)(0), (Int)(1), up);
-    tally(ledger, LEDGER_UNSCATTERED + side, photon->weight, gone & MASK(photon->scatterings == 0));
-    if (params->radius_bins == 0) return;
-    Real dx = photon->p.x - params->beam_mm[0], dy = photon->p.y - params->beam_mm[1], radius = sqrt(mad(dx, dx, dy * dy)), cosine = fabs(photon->d.z);
-    Int ring = (Int)(-1), cone = (Int)(-1);
-    for (int i = 0; i <= params->radius_bins; i++) ring -= MASK(radius >= table[params->at_radii + i]);
-    for (int i = 0; i <= params->angle_bins; i++) cone -= MASK(cosine <= table[params->at_cosines + i]);
-    Mask binned = gone & MASK(ring >= 0) & MASK(ring < params->radius_bins) & MASK(cone >= 0) & MASK(cone < params->angle_bins);
-    tally(ledger, LEDGER_BINS + (side * params->radius_bins + ring) * params->angle_bins + cone, photon->weight, binned);
-}
-
-// Takes photons over a wall across one axis, or back from it; returns those that left the box.
-static inline Mask cross_wall(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table, global ulong *ledger,
-                              uint item_first, int axis, Real wall, Mask in, Photon *photon) {
-    Real d = axis == 0 ? photon->d.x : axis == 1 ? photon->d.y : photon->d.z;
-    Int here = axis == 0 ? photon->cell.x : axis == 1 ? photon->cell.y : photon->cell.z;
-    Mask up = MASK(d > 0.0f), back = (Mask)(0);
-    Int next = here + select((Int)(-1), (Int)(1), up);
-    Mask out = in & (MASK(next < 0) | MASK(next >= params->walls[axis]));
-    Real place = wall;
-    if (params->boundary[axis] == BOUNDARY_MIRROR) back = out;
-    if (params->boundary[axis] == BOUNDARY_CYCLIC) {
-        next = select(next, select((Int)(params->walls[axis] - 1), (Int)(0), up), out);
-        place = select(place, select((Real)(params->high_mm[axis]), (Real)(params->low_mm[axis]), up), out);
-    }
-    if (params->boundary[axis] != BOUNDARY_ABSORBING) out = (Mask)(0);
-    if (axis == 0) photon->p.x = select(photon->p.x, place, in);
-    if (axis == 1) photon->p.y = select(photon->p.y, place, in);
-    if (axis == 2) photon->p.z = select(photon->p.z, place, in);
-    if ((params->fresnel && any_lane(out)) || params->mismatch) {
-        Cell ahead = photon->cell;
-        Int inside = clamp(next, (Int)(0), (Int)(params->walls[axis] - 1));
-        if (axis == 0) ahead.x = inside;
-        if (axis == 1) ahead.y = inside;
-        if (axis == 2) ahead.z = inside;
-        Real before = index_of(params, table, medium_of(params, table, photon->cell, photon->p));
-        Real after = select(index_of(params, table, medium_of(params, table, ahead, photon->p)), (Real)(params->outside_index), out);
-        Mask bends = in & ~back & MASK(before != after) & (params->fresnel ? (Mask)(-1) : ~out);
-        if (any_lane(bends)) {
-            Real eta = before / after, cos_out, reflected = fresnel(fabs(d), eta, &cos_out);
-            Mask returns = bends & MASK(unit_open(draw(pass, photon, item_first, 2).a) < reflected);
-            photon->event += as_UInt(select((Int)(0), (Int)(1), bends));
-            Mask through = bends & ~returns;
-            Real3 bent = scale3(photon->d, eta);
-            if (axis == 0) bent.x = copysign(cos_out, d);
-            if (axis == 1) bent.y = copysign(cos_out, d);
-            if (axis == 2) bent.z = copysign(cos_out, d);
-            photon->d = select3(photon->d, scale3(bent, rsqrt(fmax(dot3(bent, bent), (Real)(1e-20f)))), through);
-            back |= returns;
-        }
-    }
-    if (axis == 0) photon->d.x = select(photon->d.x, -photon->d.x, back);
-    if (axis == 1) photon->d.y = select(photon->d.y, -photon->d.y, back);
-    if (axis == 2) photon->d.z = select(photon->d.z, -photon->d.z, back);
-    Mask gone = out & ~back, moves = in & ~back & ~gone;
-    if (any_lane(gone)) leave(params, table, ledger, photon, axis, up, gone);
-    if (axis == 0) photon->cell.x = select(photon->cell.x, next, moves);
-    if (axis == 1) photon->cell.y = select(photon->cell.y, next, moves);
-    if (axis == 2) photon->cell.z = select(photon->cell.z, next, moves);
-    return gone;
-}
 
 // Collisions in the lanes of `hit`: tells the real ones, deposits, plays the roulette, scatters. Returns the photons that go on.
 static inline Mask collide(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table, Grid *grid,
@@ -116,7 +40,11 @@ static inline Mask collide(constant const FieldPass *pass, constant const Photon
 #endif
     Real absorbed = photon->weight * (1.0f - m.albedo);
     if (params->tally != TALLY_FLUENCE_TRACK && params->tally != TALLY_ABSORBED_TRACK) {
+#if REACHES
+        Int voxel = cell_voxel(params, cell_within(params, photon->cell, photon->reach, photon->p));
+#else
         Int voxel = VOXEL_WALLS ? cell_voxel(params, photon->cell) : voxel_at(params, photon->p);
+#endif
         Real amount = absorbed;
         if (params->tally == TALLY_FLUENCE) amount = photon->weight * params->deposit_scale / sigma;
         if (params->tally == TALLY_GATHER) {
@@ -162,19 +90,22 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
 
     Photon photon;
     photon.p = photon.d = real3(0.0f, 0.0f, 0.0f);
-    photon.cell.x = photon.cell.y = photon.cell.z = photon.scatterings = (Int)(0);
+    photon.cell.x = photon.cell.y = photon.cell.z = photon.medium = photon.reach = photon.scatterings = (Int)(0);
     photon.weight = photon.depth = photon.optical = (Real)(0.0f);
     photon.energy = (Real)(params->source_kev);
     photon.number = photon.event = (UInt)(0u);
+    Draws draws;
+    draws.number = draws.event = ~(UInt)(0u);
     Gains gains;
     gains.absorbed = gains.lost = gains.specular = (ULong)(0);
     gains.scatterings = (UInt)(0u);
     gains.path = (Real)(0.0f);
     Int steps = (Int)(0);
+    int passed = 0;
     Mask alive = (Mask)(0);
 
     for (;;) {
-        if (taken < share && count_lanes(~alive) >= REFILL) {
+        if (taken < share && is_launch_due(count_lanes(~alive), taken, passed)) {
             // Each free lane takes the next photon, in the lanes' order.
             IntLanes free, next;
             free.v = ~alive;
@@ -200,6 +131,9 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
                 gain(&gains.lost, photon.weight, missed);
                 tally_fixed(ledger, (Int)(LEDGER_MISSED), (ULong)(1), missed);
             }
+#if REACHES
+            look_around(params, table, fresh, &photon);
+#endif
             steps = select(steps, (Int)(0), fresh);
             alive |= fresh & ~missed & MASK(photon.weight > 0.0f);
         }
@@ -210,8 +144,12 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
 
         // Between blocks' walls the medium counts at collisions alone, where no face bends light.
         Int medium = (Int)(0);
+#if REACHES
+        medium = photon.medium;
+#else
         if (!BLOCK_WALLS || GAMMA || params->mismatch) medium = medium_of(params, table, photon.cell, photon.p);
-        UInt4Lanes random = draw(pass, &photon, item_first, 0);
+#endif
+        UInt4Lanes random = draw_ahead(pass, &photon, item_first, alive, &draws);
         Real rate = collision_rate(params, table, medium, photon.cell, photon.p);
 #if GAMMA
         rate = attenuation_at(params, table, medium, photon.energy).extinction;
@@ -219,10 +157,8 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
         rate *= gather_reals(table + params->at_voxels, cell_voxel(params, photon.cell));
 #endif
 #endif
-        Real wx = wall_ahead(params, table, 0, photon.cell.x, MASK(photon.d.x > 0.0f)), wy = wall_ahead(params, table, 1, photon.cell.y, MASK(photon.d.y > 0.0f));
-        Real wz = wall_ahead(params, table, 2, photon.cell.z, MASK(photon.d.z > 0.0f));
-        Real tx = distance_to(wx, photon.p.x, photon.d.x), ty = distance_to(wy, photon.p.y, photon.d.y), tz = distance_to(wz, photon.p.z, photon.d.z);
-        Real t_wall = fmin(tx, fmin(ty, tz));
+        Ahead ahead = look_ahead(params, table, &photon);
+        Real t_wall = ahead.nearest;
 #if TRACKING == MARCH
         // The lecture's march: a free path is as many whole steps as it takes to use up its optical depth.
         Real t = fmin(t_wall, (Real)(params->march_step_mm));
@@ -253,12 +189,7 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
         photon.depth = select(photon.depth, fmax(mad(-rate, t, photon.depth), (Real)(0.0f)), alive & ~hit);
 
         Mask crosses = alive & ~hit & ~late & at_wall, gone = late;
-        if (any_lane(crosses)) {
-            Mask in_x = crosses & MASK(tx == t_wall), in_y = crosses & ~in_x & MASK(ty == t_wall), in_z = crosses & ~in_x & ~in_y;
-            if (any_lane(in_x)) gone |= cross_wall(pass, params, table, ledger, item_first, 0, wx, in_x, &photon);
-            if (any_lane(in_y)) gone |= cross_wall(pass, params, table, ledger, item_first, 1, wy, in_y, &photon);
-            if (any_lane(in_z)) gone |= cross_wall(pass, params, table, ledger, item_first, 2, wz, in_z, &photon);
-        }
+        if (any_lane(crosses)) gone |= cross(pass, params, table, ledger, item_first, &ahead, crosses, &photon);
         if (any_lane(late)) tally(ledger, (Int)(LEDGER_GATED), photon.weight, late);
         Mask goes_on = hit;
         if (any_lane(hit)) {
@@ -268,7 +199,7 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
 #endif
             goes_on = collide(pass, params, table, &sums, ledger, item_first, random, rate, medium, hit, &photon, &gains);
         }
-        steps += 1;
+        steps += 1, passed++;
         alive &= ~gone & (goes_on | ~hit);
         Mask fault = alive & (MASK(steps > params->most_steps) | MASK(!(fabs(photon.weight) <= 1e30f)));
         if (any_lane(fault)) {

@@ -9,6 +9,8 @@
 #define VOXEL_WALLS (TRACKING == EXACT && GEOMETRY >= LABELS)
 #define LAYER_WALLS (TRACKING == EXACT && GEOMETRY == LAYERS)
 #define BLOCK_WALLS (TRACKING >= DELTA)
+// Of labels a photon knows how far around its voxel the medium is the same (params->label_bytes), and looks again where that ends.
+#define REACHES (VOXEL_WALLS && GEOMETRY == LABELS)
 
 static inline Int cell_axis(constant const PhotonTransport *params, int axis, Real p) {
     return cell_on_axis(p, params->low_mm[axis], params->walls_per_mm[axis], params->walls[axis]);
@@ -33,7 +35,16 @@ static inline Cell cell_at(constant const PhotonTransport *params, global const 
     return c;
 }
 
-// The wall ahead along an axis.
+// The last cell along an axis before the wall ahead, of those at most `reach` away.
+static inline Int cell_ahead(constant const PhotonTransport *params, int axis, Int cell, Int reach, Mask up) {
+#if REACHES
+    return clamp(select(cell - reach, cell + reach, up), (Int)(0), (Int)(params->walls[axis] - 1));
+#else
+    return cell;
+#endif
+}
+
+// The wall ahead of a cell along an axis.
 static inline Real wall_ahead(constant const PhotonTransport *params, global const float *table, int axis, Int cell, Mask up) {
 #if LAYER_WALLS
     if (axis == 2) return gather_reals(table + params->at_layers, select(cell, cell + 1, up));
@@ -58,13 +69,32 @@ static inline Int cell_voxel(constant const PhotonTransport *params, Cell c) {
     return (c.z * params->grid[1] + c.y) * params->grid[0] + c.x;
 }
 
+#if REACHES
+// The voxel at a place of which rounding must not make one beyond the walls.
+static inline Cell cell_within(constant const PhotonTransport *params, Cell c, Int reach, Real3 p) {
+    Cell at = cell_at(params, 0, p);
+    at.x = clamp(at.x, c.x - reach, c.x + reach), at.y = clamp(at.y, c.y - reach, c.y + reach), at.z = clamp(at.z, c.z - reach, c.z + reach);
+    return at;
+}
+
+// The medium of a voxel, and how far around it is the same, in the lanes of `moved`; the others look at one voxel, which is near.
+static inline Int medium_and_reach(constant const PhotonTransport *params, global const float *table, Cell c, Mask moved, Int *reach) {
+    Int voxel = select((Int)(0), cell_voxel(params, c), moved);
+    Int word = gather_words((global const uchar *)(table + params->at_voxels), voxel * (params->label_bytes + 1));
+    *reach = (word >> (8 * params->label_bytes)) & 0xff;
+    return word & (params->label_bytes == 1 ? 0xff : 0xffff);
+}
+#endif
+
 // Which medium is there; with voxel or layer walls the cell says it.
 static inline Int medium_of(constant const PhotonTransport *params, global const float *table, Cell c, Real3 p) {
 #if GEOMETRY == LAYERS
     return LAYER_WALLS ? c.z : layer_at(params, table, p.z);
+#elif REACHES
+    Int reach;
+    return medium_and_reach(params, table, c, (Mask)(-1), &reach);
 #elif GEOMETRY == LABELS
-    Int voxel = VOXEL_WALLS ? cell_voxel(params, c) : voxel_at(params, p);
-    Int word = gather_words((global const uchar *)(table + params->at_voxels), voxel * params->label_bytes);
+    Int word = gather_words((global const uchar *)(table + params->at_voxels), voxel_at(params, p) * params->label_bytes);
     return word & (params->label_bytes == 1 ? 0xff : 0xffff);
 #else
     return (Int)(0);

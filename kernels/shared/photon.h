@@ -2,6 +2,7 @@
 typedef struct {
     Real3 p, d;          // d of unit length
     Cell cell;
+    Int medium, reach;   // with REACHES: of the cell
     Real weight;
     Real depth;          // what is left of the free path, in optical depth
     Real optical;        // path times refractive index so far
@@ -10,12 +11,46 @@ typedef struct {
     Int scatterings;
 } Photon;
 
-// Four numbers of a photon's next event; `what` tells the draws of one event apart.
-static inline UInt4Lanes draw(constant const FieldPass *pass, const Photon *photon, uint item_first, uint what) {
+#if REACHES
+// Looks where photons have come to.
+static inline void look_around(constant const PhotonTransport *params, global const float *table, Mask moved, Photon *photon) {
+    Int reach, medium = medium_and_reach(params, table, photon->cell, moved, &reach);
+    photon->medium = select(photon->medium, medium, moved), photon->reach = select(photon->reach, reach, moved);
+}
+#endif
+
+// What the numbers of an event are drawn by; `what` tells the draws of one event apart.
+static inline UInt4Lanes counter(constant const FieldPass *pass, const Photon *photon, uint item_first, uint what) {
     UInt low = (pass->first[0] + item_first) + photon->number;
     UInt high = pass->first[1] + as_UInt(select((Int)(0), (Int)(1), MASK(low < pass->first[0])));
     UInt4Lanes ctr = {low, high, photon->event, (UInt)(0x70686f74u + what)};
-    return philox(ctr, pass->seed[0], pass->seed[1]);
+    return ctr;
+}
+
+// Four numbers of a photon's next event.
+static inline UInt4Lanes draw(constant const FieldPass *pass, const Photon *photon, uint item_first, uint what) {
+    return philox(counter(pass, photon, item_first, what), pass->seed[0], pass->seed[1]);
+}
+
+// The numbers of an event and of the one after it, and whose they are.
+typedef struct { UInt4Lanes first, second; UInt number, event; } Draws;
+
+// Four numbers of the next event of the photons in `alive`, which may be known already.
+static inline UInt4Lanes draw_ahead(constant const FieldPass *pass, const Photon *photon, uint item_first, Mask alive, Draws *draws) {
+    if (LANES == 1) return draw(pass, photon, item_first, 0);
+    UInt ahead = photon->event - draws->event;
+    if (any_lane(alive & (MASK(ahead > 1u) | MASK(photon->number != draws->number)))) {
+        draws->first = draws->second = counter(pass, photon, item_first, 0);
+        draws->second.c += 1u;
+        philox_two(&draws->first, &draws->second, pass->seed[0], pass->seed[1]);
+        draws->number = photon->number, draws->event = photon->event;
+        return draws->first;
+    }
+    Mask second = MASK(ahead == 1u);
+    #define NUMBER(c) as_UInt(select(as_Int(draws->first.c), as_Int(draws->second.c), second))
+    UInt4Lanes numbers = {NUMBER(a), NUMBER(b), NUMBER(c), NUMBER(d)};
+    #undef NUMBER
+    return numbers;
 }
 
 #define SOURCE_PENCIL 0

@@ -6,19 +6,28 @@ typedef struct { UInt a, b, c, d; } UInt4Lanes;
 
 static inline UInt high_product(UInt x, uint m) { return to_uint((to_ulong(x) * (ulong)m) >> 32); }
 
+static inline UInt4Lanes philox_round(UInt4Lanes ctr, uint key0, uint key1) {
+    UInt hi0 = high_product(ctr.a, 0xD2511F53u), lo0 = ctr.a * 0xD2511F53u;
+    UInt hi1 = high_product(ctr.c, 0xCD9E8D57u), lo1 = ctr.c * 0xCD9E8D57u;
+    UInt4Lanes next = {hi1 ^ ctr.b ^ key0, lo1, hi0 ^ ctr.d ^ key1, lo0};
+    return next;
+}
+
+#define PHILOX_ROUNDS 10
+#define PHILOX_KEYS(round) key0 + (round) * 0x9E3779B9u, key1 + (round) * 0xBB67AE85u
+
 // ctr = (index, sample, dimension, stream), key = seed.
 static inline UInt4Lanes philox(UInt4Lanes ctr, uint key0, uint key1) {
-    for (int round = 0; round < 10; round++) {
-        UInt hi0 = high_product(ctr.a, 0xD2511F53u), lo0 = ctr.a * 0xD2511F53u;
-        UInt hi1 = high_product(ctr.c, 0xCD9E8D57u), lo1 = ctr.c * 0xCD9E8D57u;
-        ctr.a = hi1 ^ ctr.b ^ key0;
-        ctr.b = lo1;
-        ctr.c = hi0 ^ ctr.d ^ key1;
-        ctr.d = lo0;
-        key0 += 0x9E3779B9u;
-        key1 += 0xBB67AE85u;
-    }
+    for (uint round = 0; round < PHILOX_ROUNDS; round++) ctr = philox_round(ctr, PHILOX_KEYS(round));
     return ctr;
+}
+
+// The numbers of two counters, for little more than those of one: a round waits for the one before it.
+static inline void philox_two(UInt4Lanes *a, UInt4Lanes *b, uint key0, uint key1) {
+    for (uint round = 0; round < PHILOX_ROUNDS; round++) {
+        *a = philox_round(*a, PHILOX_KEYS(round));
+        *b = philox_round(*b, PHILOX_KEYS(round));
+    }
 }
 
 // Strictly inside (0, 1): 23 bits and a half, so that neither log(u) nor log(1 - u) is ever infinite.

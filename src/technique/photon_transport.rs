@@ -42,6 +42,7 @@ mod layers;
 mod medium;
 mod parameters;
 mod plan;
+mod reach;
 mod report;
 mod source;
 mod tracking;
@@ -103,6 +104,7 @@ fn source() -> Source {
             "shared/tally.h",
             "shared/deposit.h",
             "shared/photon.h",
+            "shared/passage.h",
             "shared/compton.h",
         ],
         structs: || {

@@ -252,7 +252,7 @@ pub fn check(p: &Parameters, geometry: &Geometry, tracking: Tracking, at: &str) 
     for (i, medium) in geometry.media.iter().enumerate() {
         let place = match geometry.place {
             Where::Layers(_) => format!("{at}/layers/{i}"),
-            Where::Labels(_) => format!("{at}/media/{i}"),
+            Where::Labels { .. } => format!("{at}/media/{i}"),
             _ => format!("{at}/medium"),
         };
         let compton = medium.phase.kind == "klein_nishina";

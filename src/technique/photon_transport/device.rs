@@ -55,7 +55,7 @@ device_struct! {
         pub at_layers: i32,
         /// Labels or densities of the voxels.
         pub at_voxels: i32,
-        /// Bytes of a label: 1 or 2.
+        /// Bytes of a label: 1 or 2. With voxels' walls a byte follows that says how far around it is the same.
         pub label_bytes: i32,
         /// Majorants of the blocks.
         pub at_blocks: i32,

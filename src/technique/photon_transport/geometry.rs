@@ -7,6 +7,7 @@ use serde_json::json;
 use super::layers::{self, Layer};
 use super::medium::Medium;
 use super::parameters::Parameters;
+use super::reach::reaches;
 use crate::error::{Error, Result};
 use crate::scene::phase::Phase;
 use crate::volume::{Store, Volume, builtin};
@@ -35,7 +36,12 @@ pub enum Where {
     /// Layers by their ends along z; the last end may be infinite.
     Layers(Vec<f64>),
     /// A medium per voxel.
-    Labels(Vec<u16>),
+    Labels {
+        /// Its number.
+        of_voxel: Vec<u16>,
+        /// How far around it is the same: see [`reaches`].
+        reach: Vec<u8>,
+    },
     /// The medium's extinction times this.
     Density(Vec<f32>),
 }
@@ -129,7 +135,7 @@ impl Geometry {
         for (i, medium) in geometry.media.iter().enumerate() {
             let place = match geometry.place {
                 Where::Layers(_) => format!("{at}/layers/{i}/phase"),
-                Where::Labels(_) => format!("{at}/media/{i}/phase"),
+                Where::Labels { .. } => format!("{at}/media/{i}/phase"),
                 _ => format!("{at}/medium/phase"),
             };
             medium.phase.check(&place)?;
@@ -171,7 +177,7 @@ impl Geometry {
         let (dims, size_mm) = Self::grid_of(p, volume, at)?;
         let values =
             (0..volume.voxels().len()).map(|i| f64::from(volume.voxels().get_f32(i)) * volume.slope() + volume.inter());
-        let labels = values
+        let of_voxel = values
             .map(|v| if v.fract() == 0.0 && (0.0..media.len() as f64).contains(&v) { Ok(v as u16) } else { Err(v) })
             .collect::<std::result::Result<Vec<u16>, f64>>()
             .map_err(|v| {
@@ -181,7 +187,9 @@ impl Geometry {
                     format!("whole numbers from 0 to {}", media.len() - 1),
                 )
             })?;
-        Ok(Self { place: Where::Labels(labels), media: media.to_vec(), size_mm, dims, chamber: false })
+        let reach = reaches(&of_voxel, dims);
+        let place = Where::Labels { of_voxel, reach };
+        Ok(Self { place, media: media.to_vec(), size_mm, dims, chamber: false })
     }
 
     fn density(p: &Parameters, volume: &Volume, at: &str) -> Result<Self> {
@@ -239,9 +247,9 @@ impl Geometry {
     /// Extinction of every voxel, per mm, for the kinds that have voxels.
     pub fn voxel_extinction_per_mm(&self) -> Option<Vec<f32>> {
         match &self.place {
-            Where::Labels(labels) => {
+            Where::Labels { of_voxel, .. } => {
                 let of: Vec<f32> = self.media.iter().map(|m| m.extinction_per_mm() as f32).collect();
-                Some(labels.iter().map(|&l| of[l as usize]).collect())
+                Some(of_voxel.iter().map(|&l| of[l as usize]).collect())
             }
             Where::Density(density) => {
                 let extinction = self.media[0].extinction_per_mm() as f32;

@@ -53,7 +53,7 @@ fn features(geometry: &Geometry, tracking: Tracking) -> &'static Features {
     let place = match geometry.place {
         Where::Box => 0,
         Where::Layers(_) => 1,
-        Where::Labels(_) => 2,
+        Where::Labels { .. } => 2,
         Where::Density(_) => 3,
     };
     let wanted = [("GEOMETRY", place), ("TRACKING", tracking as i32), ("GAMMA", geometry.is_gamma().into())];
@@ -101,7 +101,7 @@ impl Simulation {
         let g = &self.geometry;
         device.walls = [1; 3];
         match (&g.place, self.tracking) {
-            (Where::Labels(_) | Where::Density(_), Tracking::Exact) => {
+            (Where::Labels { .. } | Where::Density(_), Tracking::Exact) => {
                 device.walls = g.dims.map(|n| n as i32);
                 device.wall_mm = self.spacing_mm().map(|s| s as f32);
             }
@@ -176,15 +176,20 @@ impl Simulation {
                 let ends = ends.iter().map(|e| if e.is_finite() { *e as f32 } else { ENDLESS_MM });
                 device.at_layers = append(&mut table, std::iter::once(0.0).chain(ends));
             }
-            Where::Labels(labels) => {
+            Where::Labels { of_voxel, reach } => {
                 // As bytes where they fit, so that more of them are near; a word more, for words are read from any byte on.
-                let small = g.media.len() <= 256;
-                let mut bytes: Vec<u8> =
-                    labels.iter().flat_map(|l| l.to_le_bytes().into_iter().take(if small { 1 } else { 2 })).collect();
+                let label_bytes = if g.media.len() <= 256 { 1 } else { 2 };
+                let with_reach = self.tracking == Tracking::Exact;
+                let mut bytes = Vec::with_capacity(4 * of_voxel.len());
+                for (label, reach) in of_voxel.iter().zip(reach) {
+                    bytes.extend(&label.to_le_bytes()[..label_bytes]);
+                    // Tracks are scored voxel by voxel.
+                    bytes.extend(with_reach.then_some(if self.track { 0 } else { *reach }));
+                }
                 bytes.resize(bytes.len().next_multiple_of(4) + 4, 0);
                 let words = bytes.chunks_exact(4).map(|w| f32::from_le_bytes([w[0], w[1], w[2], w[3]]));
                 device.at_voxels = append(&mut table, words);
-                device.label_bytes = if small { 1 } else { 2 };
+                device.label_bytes = label_bytes as i32;
             }
             Where::Density(density) => device.at_voxels = append(&mut table, density.iter().copied()),
         }

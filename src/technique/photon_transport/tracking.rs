@@ -1,6 +1,6 @@
 //! How free paths are found, and why.
 
-use super::geometry::Geometry;
+use super::geometry::{Geometry, Where};
 use super::parameters::Parameters;
 use crate::error::{Error, Result};
 
@@ -47,8 +47,8 @@ pub fn choose(p: &Parameters, geometry: &Geometry, track: bool, at: &str) -> Res
     Ok((tracking, format!("{}: {why}", tracking.name())))
 }
 
-/// How many walls of voxels a photon meets in a voxel's side, on average over directions.
-const WALLS_PER_VOXEL: f64 = 1.5;
+/// How many walls of cubes a photon meets in a cube's side, on average over directions.
+const WALLS_PER_SIDE: f64 = 1.5;
 /// Delta tracking is taken where it looks up less than this part of what voxels would.
 const CLEARLY_LESS: f64 = 0.7;
 
@@ -70,7 +70,15 @@ fn cheapest(p: &Parameters, geometry: &Geometry, track: bool) -> (Tracking, Stri
     }
     let mean = |v: &[f32]| v.iter().map(|e| f64::from(*e)).sum::<f64>() / v.len() as f64;
     let voxel_mm = (0..3).map(|a| geometry.size_mm[a] / geometry.dims[a] as f64).sum::<f64>() / 3.0;
-    let (by_voxels, by_majorants) = (WALLS_PER_VOXEL / voxel_mm + mean(&voxels), mean(&majorants(p, geometry).per_mm));
+    // Where labels are the same around a voxel, walls are further apart.
+    let walls = match &geometry.place {
+        Where::Labels { reach, .. } => {
+            reach.iter().map(|r| 1.0 / (2.0 * f64::from(*r) + 1.0)).sum::<f64>() / reach.len() as f64
+        }
+        _ => 1.0,
+    };
+    let by_voxels = walls * WALLS_PER_SIDE / voxel_mm + mean(&voxels);
+    let by_majorants = mean(&majorants(p, geometry).per_mm);
     let numbers = format!("{by_majorants:.3} tentative collisions a mm for {by_voxels:.3} voxels and collisions");
     if by_majorants < CLEARLY_LESS * by_voxels && p.majorant.scale >= 1.0 {
         (Tracking::Delta, format!("delta: {numbers}"))

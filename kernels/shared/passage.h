@@ -1,0 +1,137 @@
+// Walls: how far ahead they are, and what becomes of photons that have come to one.
+
+#define LEDGER_EXIT 0 // -x, +x, -y, +y, -z, +z
+#define LEDGER_ABSORBED 6
+#define LEDGER_LOST 7
+#define LEDGER_SPECULAR 8
+#define LEDGER_GATED 9
+#define LEDGER_UNSCATTERED 10 // -z, +z
+#define LEDGER_SCATTERINGS 12 // a count, like the next three
+#define LEDGER_FAULTS 13
+#define LEDGER_BROKEN 14
+#define LEDGER_MISSED 15
+#define LEDGER_PATH 16 // in units of params->path_unit_mm
+#define LEDGER_BINS 17 // -z by radius and angle, then +z
+
+// Counts what leaves the box by a face, by its radius from the beam's axis and its angle to the face.
+static inline void leave(constant const PhotonTransport *params, global const float *table, global ulong *ledger, const Photon *photon,
+                         int axis, Mask up, Mask gone) {
+    tally(ledger, select((Int)(LEDGER_EXIT + 2 * axis), (Int)(LEDGER_EXIT + 2 * axis + 1), up), photon->weight, gone);
+    if (axis != 2) return;
+    Int side = select((Int)(0), (Int)(1), up);
+    tally(ledger, LEDGER_UNSCATTERED + side, photon->weight, gone & MASK(photon->scatterings == 0));
+    if (params->radius_bins == 0) return;
+    Real dx = photon->p.x - params->beam_mm[0], dy = photon->p.y - params->beam_mm[1], radius = sqrt(mad(dx, dx, dy * dy)), cosine = fabs(photon->d.z);
+    Int ring = (Int)(-1), cone = (Int)(-1);
+    for (int i = 0; i <= params->radius_bins; i++) ring -= MASK(radius >= table[params->at_radii + i]);
+    for (int i = 0; i <= params->angle_bins; i++) cone -= MASK(cosine <= table[params->at_cosines + i]);
+    Mask binned = gone & MASK(ring >= 0) & MASK(ring < params->radius_bins) & MASK(cone >= 0) & MASK(cone < params->angle_bins);
+    tally(ledger, LEDGER_BINS + (side * params->radius_bins + ring) * params->angle_bins + cone, photon->weight, binned);
+}
+
+// Takes photons over a wall across one axis, or back from it; returns those that left the box.
+static inline Mask cross_wall(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table, global ulong *ledger,
+                              uint item_first, int axis, Real wall, Mask in, Photon *photon) {
+    Real d = axis == 0 ? photon->d.x : axis == 1 ? photon->d.y : photon->d.z;
+    Int here = axis == 0 ? photon->cell.x : axis == 1 ? photon->cell.y : photon->cell.z;
+    Mask up = MASK(d > 0.0f), back = (Mask)(0);
+    Int next = here + select((Int)(-1), (Int)(1), up);
+    Mask out = in & (MASK(next < 0) | MASK(next >= params->walls[axis]));
+    Real place = wall;
+    if (params->boundary[axis] == BOUNDARY_MIRROR) back = out;
+    if (params->boundary[axis] == BOUNDARY_CYCLIC) {
+        next = select(next, select((Int)(params->walls[axis] - 1), (Int)(0), up), out);
+        place = select(place, select((Real)(params->high_mm[axis]), (Real)(params->low_mm[axis]), up), out);
+    }
+    if (params->boundary[axis] != BOUNDARY_ABSORBING) out = (Mask)(0);
+    if ((params->fresnel && any_lane(out)) || params->mismatch) {
+        Cell ahead = photon->cell;
+        Int inside = clamp(next, (Int)(0), (Int)(params->walls[axis] - 1));
+        if (axis == 0) ahead.x = inside;
+        if (axis == 1) ahead.y = inside;
+        if (axis == 2) ahead.z = inside;
+        Real before = index_of(params, table, medium_of(params, table, photon->cell, photon->p));
+        Real after = select(index_of(params, table, medium_of(params, table, ahead, photon->p)), (Real)(params->outside_index), out);
+        Mask bends = in & ~back & MASK(before != after) & (params->fresnel ? (Mask)(-1) : ~out);
+        if (any_lane(bends)) {
+            Real eta = before / after, cos_out, reflected = fresnel(fabs(d), eta, &cos_out);
+            Mask returns = bends & MASK(unit_open(draw(pass, photon, item_first, 2).a) < reflected);
+            photon->event += as_UInt(select((Int)(0), (Int)(1), bends));
+            Mask through = bends & ~returns;
+            Real3 bent = scale3(photon->d, eta);
+            if (axis == 0) bent.x = copysign(cos_out, d);
+            if (axis == 1) bent.y = copysign(cos_out, d);
+            if (axis == 2) bent.z = copysign(cos_out, d);
+            photon->d = select3(photon->d, scale3(bent, rsqrt(fmax(dot3(bent, bent), (Real)(1e-20f)))), through);
+            back |= returns;
+        }
+    }
+    // What is sent back has not come to the other side.
+    place = select(place, wall, back);
+    if (axis == 0) photon->p.x = select(photon->p.x, place, in);
+    if (axis == 1) photon->p.y = select(photon->p.y, place, in);
+    if (axis == 2) photon->p.z = select(photon->p.z, place, in);
+    if (axis == 0) photon->d.x = select(photon->d.x, -photon->d.x, back);
+    if (axis == 1) photon->d.y = select(photon->d.y, -photon->d.y, back);
+    if (axis == 2) photon->d.z = select(photon->d.z, -photon->d.z, back);
+    Mask gone = out & ~back, moves = in & ~back & ~gone;
+    if (any_lane(gone)) leave(params, table, ledger, photon, axis, up, gone);
+    if (axis == 0) photon->cell.x = select(photon->cell.x, next, moves);
+    if (axis == 1) photon->cell.y = select(photon->cell.y, next, moves);
+    if (axis == 2) photon->cell.z = select(photon->cell.z, next, moves);
+    return gone;
+}
+
+// The walls around a photon: where they are, how far along its way, and the cells before them.
+typedef struct { Real3 wall, distance; Real nearest; Cell last; Mask up_x, up_y, up_z; } Ahead;
+
+static inline Ahead look_ahead(constant const PhotonTransport *params, global const float *table, const Photon *photon) {
+    Ahead a;
+    #define AXIS(i, c)                                                                                                     \
+        a.up_##c = MASK(photon->d.c > 0.0f);                                                                               \
+        a.last.c = cell_ahead(params, i, photon->cell.c, photon->reach, a.up_##c);                                         \
+        a.wall.c = wall_ahead(params, table, i, a.last.c, a.up_##c);                                                       \
+        a.distance.c = distance_to(a.wall.c, photon->p.c, photon->d.c);
+    AXIS(0, x)
+    AXIS(1, y)
+    AXIS(2, z)
+    #undef AXIS
+    a.nearest = fmin(a.distance.x, fmin(a.distance.y, a.distance.z));
+    return a;
+}
+
+// Takes photons over a wall across one axis behind which there are more cells, and where no light is bent. Returns those of which this
+// is not so, or not known.
+static inline Mask cross_inner(constant const PhotonTransport *params, int axis, Real wall, Mask up, Mask in, Real *p, Int *cell) {
+    if (params->mismatch) return in;
+    Int next = *cell + select((Int)(-1), (Int)(1), up);
+    Mask moves = in & MASK(next >= 0) & MASK(next < params->walls[axis]);
+    *p = select(*p, wall, moves);
+    *cell = select(*cell, next, moves);
+    return in & ~moves;
+}
+
+// Takes photons that have come to their nearest wall over it; returns those that left the box.
+static inline Mask cross(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table, global ulong *ledger,
+                         uint item_first, const Ahead *a, Mask crosses, Photon *photon) {
+    Mask gone = (Mask)(0), in_x = crosses & MASK(a->distance.x == a->nearest);
+    Mask in_y = crosses & ~in_x & MASK(a->distance.y == a->nearest), in_z = crosses & ~in_x & ~in_y;
+#if REACHES
+    Cell here = cell_within(params, photon->cell, photon->reach, photon->p);
+    photon->cell.x = select(photon->cell.x, select(here.x, a->last.x, in_x), crosses);
+    photon->cell.y = select(photon->cell.y, select(here.y, a->last.y, in_y), crosses);
+    photon->cell.z = select(photon->cell.z, select(here.z, a->last.z, in_z), crosses);
+#endif
+#if VOXEL_WALLS || BLOCK_WALLS
+    in_x = cross_inner(params, 0, a->wall.x, a->up_x, in_x, &photon->p.x, &photon->cell.x);
+    in_y = cross_inner(params, 1, a->wall.y, a->up_y, in_y, &photon->p.y, &photon->cell.y);
+    in_z = cross_inner(params, 2, a->wall.z, a->up_z, in_z, &photon->p.z, &photon->cell.z);
+#endif
+    if (any_lane(in_x)) gone |= cross_wall(pass, params, table, ledger, item_first, 0, a->wall.x, in_x, photon);
+    if (any_lane(in_y)) gone |= cross_wall(pass, params, table, ledger, item_first, 1, a->wall.y, in_y, photon);
+    if (any_lane(in_z)) gone |= cross_wall(pass, params, table, ledger, item_first, 2, a->wall.z, in_z, photon);
+#if REACHES
+    look_around(params, table, crosses, photon);
+#endif
+    return gone;
+}

@@ -1,0 +1,113 @@
+//! How far around each voxel the medium is the same, so that a photon need not look again at every voxel.
+
+use rayon::prelude::*;
+
+/// For each voxel the greatest r, at most 255, such that all voxels of the grid at most r away along each axis have its label: the
+/// Chebyshev distance to the nearest voxel that touches another label, by its face, edge or corner. Two sweeps, each from
+/// the neighbours that it has passed (Rosenfeld & Pfaltz, "Sequential Operations in Digital Picture Processing", J. ACM 13(4),
+/// 1966). x runs fastest in `labels` as in what is returned.
+pub fn reaches(labels: &[u16], dims: [usize; 3]) -> Vec<u8> {
+    let mut reach = vec![u8::MAX; labels.len()];
+    reach.par_chunks_mut(dims[0]).enumerate().for_each(|(row, out)| mark_borders(labels, dims, row, out));
+    let rows = dims[1] * dims[2];
+    let mut nearest = vec![0; dims[0] + 2];
+    (0..rows).for_each(|row| sweep(&mut reach, dims, row, 1, &mut nearest));
+    (0..rows).rev().for_each(|row| sweep(&mut reach, dims, row, -1, &mut nearest));
+    reach
+}
+
+/// The row of voxels that is dy and dz from a row, where the grid has one.
+fn row_beside([_, ny, nz]: [usize; 3], row: usize, [dy, dz]: [isize; 2]) -> Option<usize> {
+    let y = (row % ny).checked_add_signed(dy).filter(|y| *y < ny)?;
+    let z = (row / ny).checked_add_signed(dz).filter(|z| *z < nz)?;
+    Some(z * ny + y)
+}
+
+/// Sets what touches another label to 0. Across an edge or a corner it does if its neighbour in the row has another label than it
+/// or than what is beside that neighbour.
+fn mark_borders(labels: &[u16], dims: [usize; 3], row: usize, out: &mut [u8]) {
+    let nx = dims[0];
+    let own = &labels[row * nx..][..nx];
+    let mut differs = vec![false; nx];
+    for beside in (0..9).filter_map(|i| row_beside(dims, row, [i % 3 - 1, i / 3 - 1])) {
+        let other = &labels[beside * nx..][..nx];
+        differs.iter_mut().zip(own.iter().zip(other)).for_each(|(d, (a, b))| *d |= a != b);
+    }
+    for x in 0..nx {
+        let around = x.saturating_sub(1)..(x + 2).min(nx);
+        if around.into_iter().any(|i| differs[i] || own[i] != own[x]) {
+            out[x] = 0;
+        }
+    }
+}
+
+/// Brings a row's distances down to what its neighbours in the rows before it say (after it for `sense` -1), and those in it.
+/// `nearest` is for use meanwhile: one more than the row at each end.
+fn sweep(reach: &mut [u8], dims: [usize; 3], row: usize, sense: isize, nearest: &mut [u8]) {
+    let nx = dims[0];
+    nearest.fill(u8::MAX);
+    for beside in
+        [[-1, 0], [-1, -1], [0, -1], [1, -1]].into_iter().filter_map(|d| row_beside(dims, row, d.map(|n| n * sense)))
+    {
+        let other = &reach[beside * nx..][..nx];
+        nearest[1..=nx].iter_mut().zip(other).for_each(|(n, r)| *n = (*n).min(*r));
+    }
+    let line = &mut reach[row * nx..][..nx];
+    for (r, near) in line.iter_mut().zip(nearest.windows(3)) {
+        *r = (*r).min(near[0].min(near[1]).min(near[2]).saturating_add(1));
+    }
+    for x in 1..nx {
+        line[x] = line[x].min(line[x - 1].saturating_add(1));
+    }
+    for x in (1..nx).rev() {
+        line[x - 1] = line[x - 1].min(line[x].saturating_add(1));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By trying one size after the other.
+    fn by_looking(labels: &[u16], [nx, ny, nz]: [usize; 3], voxel: usize) -> u8 {
+        let at = [voxel % nx, voxel / nx % ny, voxel / nx / ny];
+        let same = |r: usize| {
+            let range = |a: usize, n: usize| at[a].saturating_sub(r)..(at[a] + r + 1).min(n);
+            range(2, nz)
+                .all(|z| range(1, ny).all(|y| range(0, nx).all(|x| labels[(z * ny + y) * nx + x] == labels[voxel])))
+        };
+        (1..=255).find(|r| !same(*r)).map_or(255, |r| r as u8 - 1)
+    }
+
+    #[test]
+    fn reaches_are_what_looking_around_finds() {
+        let dims = [13, 9, 11];
+        let count = dims.iter().product::<usize>();
+        let ball = |i: usize| {
+            let [x, y, z] = [i % 13, i / 13 % 9, i / 117].map(|c| c as i32);
+            u16::from((x - 8).pow(2) + (y - 3).pow(2) + (z - 5).pow(2) < 14)
+        };
+        let corner = |i: usize| u16::from(i == count - 1);
+        let noise = |i: usize| u16::from(i * 2_654_435_761 % 97 < 3);
+        let stripes = |i: usize| (i / 13 % 9 / 4) as u16;
+        for labels in [
+            (0..count).map(ball).collect::<Vec<_>>(),
+            (0..count).map(corner).collect(),
+            (0..count).map(noise).collect(),
+            (0..count).map(stripes).collect(),
+        ] {
+            let wanted: Vec<u8> = (0..count).map(|i| by_looking(&labels, dims, i)).collect();
+            assert_eq!(reaches(&labels, dims), wanted);
+            assert!(wanted.iter().any(|r| *r > 0), "all of them border on another");
+        }
+    }
+
+    #[test]
+    fn one_label_reaches_as_far_as_a_byte_can_say() {
+        assert_eq!(reaches(&[4; 300], [300, 1, 1]), [255; 300]);
+        let mut labels = [4; 600];
+        labels[599] = 5;
+        let reach = reaches(&labels, [600, 1, 1]);
+        assert_eq!((reach[599], reach[598], reach[590], reach[344], reach[343], reach[0]), (0, 0, 8, 254, 255, 255));
+    }
+}
