@@ -8,7 +8,7 @@
 // live n steps, then LANES / (n f) of the time goes into launches and (f - 1) / (2 LANES) is lost to free lanes, the least together
 // where f^2 is 2 LANES^2 / n. So far n is LANES times the steps that have passed over the photons taken.
 static inline int is_launch_due(int free, int taken, int passed) {
-    return free == LANES || (float)(free * free) * (float)passed >= 2.0f * LANES * (float)taken;
+    return free == LANES || (long)(free * free) * passed >= 2L * LANES * taken;
 }
 
 typedef struct { ULong absorbed, lost, specular; UInt scatterings; Real path; } Gains;
@@ -165,7 +165,7 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
         Mask at_wall = MASK(t_wall <= params->march_step_mm), hit = alive & ~at_wall & MASK(photon.depth <= rate * t) & MASK(rate > 0.0f);
 #else
         Mask hit = MASK(photon.depth < rate * t_wall) & alive, at_wall = ~hit;
-        Real t = select(t_wall, photon.depth / rate, hit);
+        Real t = select(t_wall, photon.depth * reciprocal(rate), hit);
 #endif
         Mask late = (Mask)(0);
         if (params->gate_mm < 1e30f) {

@@ -186,6 +186,16 @@ static inline Real inverse_root(Real v) {
 static inline Real inverse_root(Real v) { return rsqrt(v); }
 #endif
 
+// 1 / v likewise, to a place or two of the last; of 0 it is not a number.
+#if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_rcp14ps512_mask)
+static inline Real reciprocal(Real v) {
+    Real r = __builtin_ia32_rcp14ps512_mask(v, (Real)(0.0f), (short)-1);
+    return mad(mad(-v, r, (Real)(1.0f)), r, r);
+}
+#else
+static inline Real reciprocal(Real v) { return 1.0f / v; }
+#endif
+
 // x^y for x in [0, 1] and y >= 1 by squares, from the highest binary place of y down; between whole numbers it is interpolated.
 static inline Real power(Real x, float y) {
     uint whole = (uint)y;

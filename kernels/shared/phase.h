@@ -26,8 +26,8 @@ static inline void turn(Real v, Real *sine, Real *cosine) {
 static inline Real3 turned(Real3 d, Real one_minus, Real one_plus, Real v) {
     Real sine, cosine;
     turn(v, &sine, &cosine);
-    Real away = sqrt(one_minus * one_plus), along_d = 1.0f - one_minus, u = away * cosine, w = away * sine;
-    Real s = copysign((Real)(1.0f), d.z), a = -1.0f / (s + d.z), b = d.x * d.y * a;
+    Real away2 = fmax(one_minus * one_plus, (Real)(1e-30f)), away = away2 * inverse_root(away2), along_d = 1.0f - one_minus, u = away * cosine, w = away * sine;
+    Real s = copysign((Real)(1.0f), d.z), a = -reciprocal(s + d.z), b = d.x * d.y * a;
     Real3 r = real3(mad(along_d, d.x, mad(u, mad(s * d.x * d.x, a, (Real)(1.0f)), w * b)),
                     mad(along_d, d.y, mad(u, s * b, w * mad(d.y * d.y, a, s))),
                     mad(along_d, d.z, -mad(u, s * d.x, w * d.y)));
@@ -38,7 +38,7 @@ static inline Real3 turned(Real3 d, Real one_minus, Real one_plus, Real v) {
 //   1 - mu = 2 (1 - g)^2 (1 - u) (1 + g u) / D^2,  1 + mu = 2 (1 + g)^2 u (1 - g (1 - u)) / D^2,
 // which loses no digits for g = 0, g near 1 or -1, or angles near 0.
 static inline void sample_lobe(Real g, Real u, Real *one_minus, Real *one_plus) {
-    Real v = 1.0f - u, inverse = 1.0f / mad(2.0f * g, u, 1.0f - g), twice = 2.0f * inverse * inverse;
+    Real v = 1.0f - u, inverse = reciprocal(mad(2.0f * g, u, 1.0f - g)), twice = 2.0f * inverse * inverse;
     *one_minus = twice * ((1.0f - g) * (1.0f - g)) * (v * mad(g, u, (Real)(1.0f)));
     *one_plus = twice * ((1.0f + g) * (1.0f + g)) * (u * mad(-g, v, (Real)(1.0f)));
 }
@@ -90,9 +90,13 @@ static inline Real table_density(global const float *table, Int first, Int rows,
 
 // 1 - cosine and 1 + cosine of a collision's angle, by the number u.
 static inline void sample_phase(global const float *table, const Medium *m, Real u, Real *one_minus, Real *one_plus) {
-    Mask first = MASK(u < m->c);
-    Real share = select((u - m->c) / fmax(1.0f - m->c, (Real)(1e-30f)), u / m->c, first);
-    sample_lobe(select(m->b, m->a, first), clamp(share, (Real)(5.9604645e-8f), (Real)(0.99999994f)), one_minus, one_plus);
+    Real g = m->a, share = u;
+    if (any_lane(MASK(m->c < 1.0f))) {
+        Mask first = MASK(u < m->c);
+        g = select(m->b, m->a, first);
+        share = select((u - m->c) / fmax(1.0f - m->c, (Real)(1e-30f)), u / m->c, first);
+    }
+    sample_lobe(g, clamp(share, (Real)(5.9604645e-8f), (Real)(0.99999994f)), one_minus, one_plus);
     Mask rayleigh = MASK(m->kind == PHASE_RAYLEIGH), tabulated = MASK(m->kind == PHASE_TABLE);
     if (!any_lane(rayleigh | tabulated)) return;
     Real mu = (Real)(0.0f);

@@ -25,7 +25,7 @@ static inline Real wall_on_axis(Int cell, Mask up, float low, float side, float 
 }
 
 static inline Real distance_to(Real wall, Real p, Real d) {
-    return select(fmax((wall - p) / d, (Real)(0.0f)), (Real)(1e30f), MASK(fabs(d) < 1e-12f));
+    return select(fmax((wall - p) * reciprocal(d), (Real)(0.0f)), (Real)(1e30f), MASK(fabs(d) < 1e-12f));
 }
 
 #if TRACKING >= DELTA
