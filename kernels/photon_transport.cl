@@ -7,15 +7,13 @@
 // Whether photons are launched into so many free lanes. A launch costs about a step of all lanes: if each fills f of them, and photons
 // live n steps, then LANES / (n f) of the time goes into launches and (f - 1) / (2 LANES) is lost to free lanes, the least together
 // where f^2 is 2 LANES^2 / n. So far n is LANES times the steps that have passed over the photons taken.
-static inline int is_launch_due(int free, int taken, int passed) {
-    return free == LANES || (long)(free * free) * passed >= 2L * LANES * taken;
+static inline int is_launch_due(int free, long taken, long passed) {
+    return free == LANES || free * free * passed >= 2 * LANES * taken;
 }
-
-typedef struct { ULong absorbed, lost, specular; UInt scatterings; Real path; } Gains;
 
 // Collisions in the lanes of `hit`: tells the real ones, deposits, plays the roulette, scatters. Returns the photons that go on.
 static inline Mask collide(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table, Grid *grid,
-                           global ulong *ledger, uint item_first, UInt4Lanes r, Real rate, Int medium, Mask hit, Photon *photon, Gains *gains) {
+                           global ulong *ledger, UInt4Lanes r, Real rate, Int medium, Mask hit, Photon *photon, Gains *gains) {
     photon->depth = select(photon->depth, -log(unit_open(r.c)), hit);
     Mask real = hit;
     Medium m = medium_all(params, table, medium);
@@ -23,7 +21,7 @@ static inline Mask collide(constant const FieldPass *pass, constant const Photon
 #if GAMMA
     m.albedo = attenuation_at(params, table, medium, photon->energy).albedo;
     // Weight is energy: what the electron gets is absorbed as well. Below the tables all of it is.
-    Real one_minus, kept = compton(pass, photon, item_first, photon->energy, hit, &one_minus);
+    Real one_minus, kept = compton(pass, photon, photon->energy, hit, &one_minus);
     m.albedo *= select((Real)(0.0f), kept, MASK(kept * photon->energy > params->gamma_least_kev));
 #endif
 #if BLOCK_WALLS
@@ -53,14 +51,14 @@ static inline Mask collide(constant const FieldPass *pass, constant const Photon
         }
         deposit(params, grid, voxel, photon->p, amount, real);
     }
-    gain(&gains->absorbed, absorbed, real);
+    gain(&gains->sums[LEDGER_ABSORBED], absorbed, real);
     gains->scatterings += as_UInt(select((Int)(0), (Int)(1), real));
     Real left = photon->weight - absorbed;
     Mask faint = MASK(fabs(left) < params->roulette_threshold) & real;
     if (any_lane(faint)) {
-        Mask survives = MASK(unit_open(draw(pass, photon, item_first, 3).a) < params->roulette_survival);
+        Mask survives = MASK(unit_open(draw(pass, photon, 3).a) < params->roulette_survival);
         Real gained = select((Real)(0.0f), left / params->roulette_survival, survives);
-        gain(&gains->lost, left - gained, faint);
+        gain(&gains->sums[LEDGER_LOST], left - gained, faint);
         left = select(left, gained, faint);
     }
     photon->weight = select(photon->weight, left, real);
@@ -78,13 +76,17 @@ static inline Mask collide(constant const FieldPass *pass, constant const Photon
     return goes_on | (hit & ~real);
 }
 
+// Where the share of photons ends that begins with that one.
+static inline uint share_end(constant const FieldPass *pass, uint first) { return first + min(pass->count - first, pass->per_item); }
+
 kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport *params, global const float *table, global ulong *grid,
                              global ulong *ledger) {
     if (get_global_id(0) % pass->stride != 0) return;
-    uint item = (uint)get_global_id(0) / pass->stride, item_first = item * pass->per_item;
+    uint item = (uint)get_global_id(0) / pass->stride;
     if ((ulong)item * pass->per_item >= pass->count) return;
-    // The last item of a launch may have fewer photons: never one too many.
-    int share = (int)min(pass->count - item_first, pass->per_item), taken = 0;
+    // Photons to launch: the item's share, or one share after the other, as long as there are any, which no item has taken.
+    uint next = pass->own_grids ? 0 : item * pass->per_item, end = pass->own_grids ? 0 : share_end(pass, next);
+    bool more = pass->own_grids;
     int voxels = params->grid[0] * params->grid[1] * params->grid[2];
     Grid sums = grid_at(grid + (pass->own_grids ? (size_t)item * voxels : 0), pass->own_grids, voxels);
 
@@ -96,28 +98,32 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
     photon.number = photon.event = (UInt)(0u);
     Draws draws;
     draws.number = draws.event = ~(UInt)(0u);
-    Gains gains;
-    gains.absorbed = gains.lost = gains.specular = (ULong)(0);
-    gains.scatterings = (UInt)(0u);
-    gains.path = (Real)(0.0f);
+    Gains gains = no_gains();
     Int steps = (Int)(0);
-    int passed = 0;
+    long passed = 0, taken = 0;
     Mask alive = (Mask)(0);
 
     for (;;) {
-        if (taken < share && is_launch_due(count_lanes(~alive), taken, passed)) {
+        if (next == end && more) {
+            next = min((uint)atom_add(&ledger[pass->taken_at], (ulong)pass->per_item), pass->count);
+            end = share_end(pass, next);
+            more = next < end;
+        }
+        if (next < end && is_launch_due(count_lanes(~alive), taken, passed)) {
             // Each free lane takes the next photon, in the lanes' order.
-            IntLanes free, next;
+            IntLanes free, number;
             free.v = ~alive;
-            for (int i = 0; i < LANES; i++) next.lane[i] = taken, taken -= free.lane[i];
-            Mask fresh = ~alive & MASK(next.v < share);
+            int left = (int)(end - next), given = 0;
+            for (int i = 0; i < LANES; i++) number.lane[i] = given, given -= free.lane[i];
+            Mask fresh = ~alive & MASK(number.v < left);
             Photon launched = photon;
-            launched.number = as_UInt(next.v);
+            launched.number = as_UInt(number.v) + next;
+            given = min(given, left), next += (uint)given, taken += given;
             launched.event = (UInt)(0u);
-            launch(pass, params, item_first, &launched);
+            launch(pass, params, &launched);
             launched.event = (UInt)(1u), launched.weight = (Real)(1.0f), launched.optical = (Real)(0.0f), launched.scatterings = (Int)(0);
             Mask missed;
-            enter(params, table, fresh, &launched, &gains.specular, &missed);
+            enter(params, table, fresh, &launched, &gains, &missed);
             photon.p = select3(photon.p, launched.p, fresh), photon.d = select3(photon.d, launched.d, fresh);
             photon.cell.x = select(photon.cell.x, launched.cell.x, fresh), photon.cell.y = select(photon.cell.y, launched.cell.y, fresh);
             photon.cell.z = select(photon.cell.z, launched.cell.z, fresh);
@@ -128,7 +134,7 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
             photon.scatterings = select(photon.scatterings, (Int)(0), fresh);
             photon.energy = select(photon.energy, (Real)(params->source_kev), fresh);
             if (any_lane(missed)) {
-                gain(&gains.lost, photon.weight, missed);
+                gain(&gains.sums[LEDGER_LOST], photon.weight, missed);
                 tally_fixed(ledger, (Int)(LEDGER_MISSED), (ULong)(1), missed);
             }
 #if REACHES
@@ -138,7 +144,7 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
             alive |= fresh & ~missed & MASK(photon.weight > 0.0f);
         }
         if (!any_lane(alive)) {
-            if (taken >= share) break;
+            if (next == end && !more) break;
             continue;
         }
 
@@ -149,7 +155,7 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
 #else
         if (!BLOCK_WALLS || GAMMA || params->mismatch) medium = medium_of(params, table, photon.cell, photon.p);
 #endif
-        UInt4Lanes random = draw_ahead(pass, &photon, item_first, alive, &draws);
+        UInt4Lanes random = draw_ahead(pass, &photon, alive, &draws);
         Real rate = collision_rate(params, table, medium, photon.cell, photon.p);
 #if GAMMA
         rate = attenuation_at(params, table, medium, photon.energy).extinction;
@@ -185,33 +191,29 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
 #endif
         }
         photon.p = select3(photon.p, along(photon.p, photon.d, t), alive);
-        gains.path += select((Real)(0.0f), t * params->paths_per_mm, alive);
+        gains.path += to_ulong(to_uint(select((Real)(0.0f), fmin(rint(t * params->paths_per_mm), (Real)(2e9f)), alive)));
         photon.depth = select(photon.depth, fmax(mad(-rate, t, photon.depth), (Real)(0.0f)), alive & ~hit);
 
         Mask crosses = alive & ~hit & ~late & at_wall, gone = late;
-        if (any_lane(crosses)) gone |= cross(pass, params, table, ledger, item_first, &ahead, crosses, &photon);
-        if (any_lane(late)) tally(ledger, (Int)(LEDGER_GATED), photon.weight, late);
+        if (any_lane(crosses)) gone |= cross(pass, params, table, ledger, &gains, &ahead, crosses, &photon);
+        if (any_lane(late)) gain(&gains.sums[LEDGER_GATED], photon.weight, late);
         Mask goes_on = hit;
         if (any_lane(hit)) {
 #if TRACKING == MARCH || BLOCK_WALLS
             // The medium is that of the place which the photon has come to.
             medium = medium_of(params, table, photon.cell, photon.p);
 #endif
-            goes_on = collide(pass, params, table, &sums, ledger, item_first, random, rate, medium, hit, &photon, &gains);
+            goes_on = collide(pass, params, table, &sums, ledger, random, rate, medium, hit, &photon, &gains);
         }
         steps += 1, passed++;
         alive &= ~gone & (goes_on | ~hit);
         Mask fault = alive & (MASK(steps > params->most_steps) | MASK(!(fabs(photon.weight) <= 1e30f)));
         if (any_lane(fault)) {
-            gain(&gains.lost, select((Real)(0.0f), photon.weight, MASK(fabs(photon.weight) <= 1e30f)), fault);
+            gain(&gains.sums[LEDGER_LOST], select((Real)(0.0f), photon.weight, MASK(fabs(photon.weight) <= 1e30f)), fault);
             tally_fixed(ledger, (Int)(LEDGER_FAULTS), (ULong)(1), fault);
             alive &= ~fault;
         }
     }
     if (sums.own) grid_flush(&sums);
-    tally_fixed(ledger, (Int)(LEDGER_ABSORBED), gains.absorbed, (Mask)(-1));
-    tally_fixed(ledger, (Int)(LEDGER_LOST), gains.lost, (Mask)(-1));
-    tally_fixed(ledger, (Int)(LEDGER_SPECULAR), gains.specular, (Mask)(-1));
-    tally_fixed(ledger, (Int)(LEDGER_SCATTERINGS), to_ulong(gains.scatterings), (Mask)(-1));
-    tally_fixed(ledger, (Int)(LEDGER_PATH), as_ULong(to_long(rint(gains.path))), (Mask)(-1));
+    gains_flush(ledger, &gains);
 }

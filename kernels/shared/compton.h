@@ -18,11 +18,11 @@ static inline Attenuation attenuation_at(constant const PhotonTransport *params,
 // The part of its energy that a photon keeps, and 1 - cosine of its angle: by composition and rejection from
 //   d sigma / d eps ~ (1 / eps + eps) (1 - eps sin^2 / (1 + eps^2)),  eps = E' / E
 // (Butcher & Messel, Nucl. Phys. 20, 1960). Three of four tries succeed at worst.
-static inline Real compton(constant const FieldPass *pass, const Photon *photon, uint item_first, Real energy, Mask on, Real *one_minus) {
+static inline Real compton(constant const FieldPass *pass, const Photon *photon, Real energy, Mask on, Real *one_minus) {
     Real k = energy * (1.0f / ELECTRON_KEV), least = 1.0f / mad((Real)(2.0f), k, (Real)(1.0f));
     Real a1 = -log(least), a2 = 0.5f * mad(-least, least, (Real)(1.0f)), kept = (Real)(1.0f), minus = (Real)(0.0f);
     for (uint i = 0; i < 64 && any_lane(on); i++) {
-        UInt4Lanes r = draw(pass, photon, item_first, 16 + i);
+        UInt4Lanes r = draw(pass, photon, 16 + i);
         Real u = unit_open(r.b);
         Mask first = MASK(unit_open(r.a) * (a1 + a2) < a1);
         Real eps = select(sqrt(mad(1.0f - least * least, u, least * least)), exp(-a1 * u), first);

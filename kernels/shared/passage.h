@@ -1,26 +1,18 @@
 // Walls: how far ahead they are, and what becomes of photons that have come to one.
 
-#define LEDGER_EXIT 0 // -x, +x, -y, +y, -z, +z
-#define LEDGER_ABSORBED 6
-#define LEDGER_LOST 7
-#define LEDGER_SPECULAR 8
-#define LEDGER_GATED 9
-#define LEDGER_UNSCATTERED 10 // -z, +z
-#define LEDGER_SCATTERINGS 12 // a count, like the next three
-#define LEDGER_FAULTS 13
-#define LEDGER_BROKEN 14
-#define LEDGER_MISSED 15
-#define LEDGER_PATH 16 // in units of params->path_unit_mm
-#define LEDGER_BINS 17 // -z by radius and angle, then +z
-
 // Counts what leaves the box by a face, by its radius from the beam's axis and its angle to the face.
-static inline void leave(constant const PhotonTransport *params, global const float *table, global ulong *ledger, const Photon *photon,
+static inline void leave(constant const PhotonTransport *params, global const float *table, global ulong *ledger, Gains *gains, const Photon *photon,
                          int axis, Mask up, Mask gone) {
-    tally(ledger, select((Int)(LEDGER_EXIT + 2 * axis), (Int)(LEDGER_EXIT + 2 * axis + 1), up), photon->weight, gone);
+    gain(&gains->sums[LEDGER_EXIT + 2 * axis], photon->weight, gone & ~up);
+    gain(&gains->sums[LEDGER_EXIT + 2 * axis + 1], photon->weight, gone & up);
     if (axis != 2) return;
-    Int side = select((Int)(0), (Int)(1), up);
-    tally(ledger, LEDGER_UNSCATTERED + side, photon->weight, gone & MASK(photon->scatterings == 0));
+    Mask unscattered = gone & MASK(photon->scatterings == 0);
+    if (any_lane(unscattered)) {
+        gain(&gains->sums[LEDGER_UNSCATTERED], photon->weight, unscattered & ~up);
+        gain(&gains->sums[LEDGER_UNSCATTERED + 1], photon->weight, unscattered & up);
+    }
     if (params->radius_bins == 0) return;
+    Int side = select((Int)(0), (Int)(1), up);
     Real dx = photon->p.x - params->beam_mm[0], dy = photon->p.y - params->beam_mm[1], radius = sqrt(mad(dx, dx, dy * dy)), cosine = fabs(photon->d.z);
     Int ring = (Int)(-1), cone = (Int)(-1);
     for (int i = 0; i <= params->radius_bins; i++) ring -= MASK(radius >= table[params->at_radii + i]);
@@ -30,8 +22,8 @@ static inline void leave(constant const PhotonTransport *params, global const fl
 }
 
 // Takes photons over a wall across one axis, or back from it; returns those that left the box.
-static inline Mask cross_wall(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table, global ulong *ledger,
-                              uint item_first, int axis, Real wall, Mask in, Photon *photon) {
+static inline Mask cross_wall(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table, global ulong *ledger, Gains *gains,
+                              int axis, Real wall, Mask in, Photon *photon) {
     Real d = axis == 0 ? photon->d.x : axis == 1 ? photon->d.y : photon->d.z;
     Int here = axis == 0 ? photon->cell.x : axis == 1 ? photon->cell.y : photon->cell.z;
     Mask up = MASK(d > 0.0f), back = (Mask)(0);
@@ -55,7 +47,7 @@ static inline Mask cross_wall(constant const FieldPass *pass, constant const Pho
         Mask bends = in & ~back & MASK(before != after) & (params->fresnel ? (Mask)(-1) : ~out);
         if (any_lane(bends)) {
             Real eta = before / after, cos_out, reflected = fresnel(fabs(d), eta, &cos_out);
-            Mask returns = bends & MASK(unit_open(draw(pass, photon, item_first, 2).a) < reflected);
+            Mask returns = bends & MASK(unit_open(draw(pass, photon, 2).a) < reflected);
             photon->event += as_UInt(select((Int)(0), (Int)(1), bends));
             Mask through = bends & ~returns;
             Real3 bent = scale3(photon->d, eta);
@@ -75,7 +67,7 @@ static inline Mask cross_wall(constant const FieldPass *pass, constant const Pho
     if (axis == 1) photon->d.y = select(photon->d.y, -photon->d.y, back);
     if (axis == 2) photon->d.z = select(photon->d.z, -photon->d.z, back);
     Mask gone = out & ~back, moves = in & ~back & ~gone;
-    if (any_lane(gone)) leave(params, table, ledger, photon, axis, up, gone);
+    if (any_lane(gone)) leave(params, table, ledger, gains, photon, axis, up, gone);
     if (axis == 0) photon->cell.x = select(photon->cell.x, next, moves);
     if (axis == 1) photon->cell.y = select(photon->cell.y, next, moves);
     if (axis == 2) photon->cell.z = select(photon->cell.z, next, moves);
@@ -112,8 +104,8 @@ static inline Mask cross_inner(constant const PhotonTransport *params, int axis,
 }
 
 // Takes photons that have come to their nearest wall over it; returns those that left the box.
-static inline Mask cross(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table, global ulong *ledger,
-                         uint item_first, const Ahead *a, Mask crosses, Photon *photon) {
+static inline Mask cross(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table, global ulong *ledger, Gains *gains,
+                         const Ahead *a, Mask crosses, Photon *photon) {
     Mask gone = (Mask)(0), in_x = crosses & MASK(a->distance.x == a->nearest);
     Mask in_y = crosses & ~in_x & MASK(a->distance.y == a->nearest), in_z = crosses & ~in_x & ~in_y;
 #if REACHES
@@ -127,9 +119,9 @@ static inline Mask cross(constant const FieldPass *pass, constant const PhotonTr
     in_y = cross_inner(params, 1, a->wall.y, a->up_y, in_y, &photon->p.y, &photon->cell.y);
     in_z = cross_inner(params, 2, a->wall.z, a->up_z, in_z, &photon->p.z, &photon->cell.z);
 #endif
-    if (any_lane(in_x)) gone |= cross_wall(pass, params, table, ledger, item_first, 0, a->wall.x, in_x, photon);
-    if (any_lane(in_y)) gone |= cross_wall(pass, params, table, ledger, item_first, 1, a->wall.y, in_y, photon);
-    if (any_lane(in_z)) gone |= cross_wall(pass, params, table, ledger, item_first, 2, a->wall.z, in_z, photon);
+    if (any_lane(in_x)) gone |= cross_wall(pass, params, table, ledger, gains, 0, a->wall.x, in_x, photon);
+    if (any_lane(in_y)) gone |= cross_wall(pass, params, table, ledger, gains, 1, a->wall.y, in_y, photon);
+    if (any_lane(in_z)) gone |= cross_wall(pass, params, table, ledger, gains, 2, a->wall.z, in_z, photon);
 #if REACHES
     look_around(params, table, crosses, photon);
 #endif

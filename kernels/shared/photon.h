@@ -7,7 +7,7 @@ typedef struct {
     Real depth;          // what is left of the free path, in optical depth
     Real optical;        // path times refractive index so far
     Real energy;         // of a gamma photon, keV
-    UInt number, event;  // key its random numbers
+    UInt number, event;  // key its random numbers; the number is that in this launch
     Int scatterings;
 } Photon;
 
@@ -20,27 +20,27 @@ static inline void look_around(constant const PhotonTransport *params, global co
 #endif
 
 // What the numbers of an event are drawn by; `what` tells the draws of one event apart.
-static inline UInt4Lanes counter(constant const FieldPass *pass, const Photon *photon, uint item_first, uint what) {
-    UInt low = (pass->first[0] + item_first) + photon->number;
+static inline UInt4Lanes counter(constant const FieldPass *pass, const Photon *photon, uint what) {
+    UInt low = pass->first[0] + photon->number;
     UInt high = pass->first[1] + as_UInt(select((Int)(0), (Int)(1), MASK(low < pass->first[0])));
     UInt4Lanes ctr = {low, high, photon->event, (UInt)(0x70686f74u + what)};
     return ctr;
 }
 
 // Four numbers of a photon's next event.
-static inline UInt4Lanes draw(constant const FieldPass *pass, const Photon *photon, uint item_first, uint what) {
-    return philox(counter(pass, photon, item_first, what), pass->seed[0], pass->seed[1]);
+static inline UInt4Lanes draw(constant const FieldPass *pass, const Photon *photon, uint what) {
+    return philox(counter(pass, photon, what), pass->seed[0], pass->seed[1]);
 }
 
 // The numbers of an event and of the one after it, and whose they are.
 typedef struct { UInt4Lanes first, second; UInt number, event; } Draws;
 
 // Four numbers of the next event of the photons in `alive`, which may be known already.
-static inline UInt4Lanes draw_ahead(constant const FieldPass *pass, const Photon *photon, uint item_first, Mask alive, Draws *draws) {
-    if (LANES == 1) return draw(pass, photon, item_first, 0);
+static inline UInt4Lanes draw_ahead(constant const FieldPass *pass, const Photon *photon, Mask alive, Draws *draws) {
+    if (LANES == 1) return draw(pass, photon, 0);
     UInt ahead = photon->event - draws->event;
     if (any_lane(alive & (MASK(ahead > 1u) | MASK(photon->number != draws->number)))) {
-        draws->first = draws->second = counter(pass, photon, item_first, 0);
+        draws->first = draws->second = counter(pass, photon, 0);
         draws->second.c += 1u;
         philox_two(&draws->first, &draws->second, pass->seed[0], pass->seed[1]);
         draws->number = photon->number, draws->event = photon->event;
@@ -61,8 +61,8 @@ static inline UInt4Lanes draw_ahead(constant const FieldPass *pass, const Photon
 #define SOURCE_DIFFUSE 5
 
 // Where and whither a source sends the photon.
-static inline void launch(constant const FieldPass *pass, constant const PhotonTransport *params, uint item_first, Photon *photon) {
-    UInt4Lanes r = draw(pass, photon, item_first, 0);
+static inline void launch(constant const FieldPass *pass, constant const PhotonTransport *params, Photon *photon) {
+    UInt4Lanes r = draw(pass, photon, 0);
     constant const float *at = params->source, *axis = params->source_axis;
     photon->p = real3(at[0], at[1], at[2]);
     photon->d = real3(axis[0], axis[1], axis[2]);
@@ -77,7 +77,7 @@ static inline void launch(constant const FieldPass *pass, constant const PhotonT
         photon->d = turned(photon->d, 1.0f - cosine, 1.0f + cosine, v);
     }
     if (params->source_type == SOURCE_PLANAR || params->source_type == SOURCE_DISK || params->source_type == SOURCE_DIFFUSE) {
-        UInt4Lanes s = draw(pass, photon, item_first, 1);
+        UInt4Lanes s = draw(pass, photon, 1);
         u = unit_open(s.a), v = unit_open(s.b);
         if (params->source_type != SOURCE_PLANAR) {
             Real sine, cosine, radius = sqrt(u);
@@ -90,7 +90,7 @@ static inline void launch(constant const FieldPass *pass, constant const PhotonT
 }
 
 // Takes a photon from where it was launched to the box, where it is bent and in part reflected. What misses the box is `missed`.
-static inline void enter(constant const PhotonTransport *params, global const float *table, Mask fresh, Photon *photon, ULong *specular,
+static inline void enter(constant const PhotonTransport *params, global const float *table, Mask fresh, Photon *photon, Gains *gains,
                          Mask *missed) {
     Real near = (Real)(-1e30f), far = (Real)(1e30f);
     Int axis = (Int)(0);
@@ -127,7 +127,7 @@ static inline void enter(constant const PhotonTransport *params, global const fl
     reflected = select((Real)(0.0f), reflected, outside & MASK(eta != 1.0f));
     if (params->specular_entry) {
         Real lost = photon->weight * reflected;
-        gain(specular, lost, outside);
+        gain(&gains->sums[LEDGER_SPECULAR], lost, outside);
         photon->weight = select(photon->weight, photon->weight - lost, outside);
     }
     Mask bent = outside & MASK(eta != 1.0f) & MASK(reflected < 1.0f);

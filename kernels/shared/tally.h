@@ -13,5 +13,33 @@ static inline void tally_fixed(global ulong *sums, Int cell, ULong amount, Mask 
 
 static inline void tally(global ulong *sums, Int cell, Real amount, Mask active) { tally_fixed(sums, cell, fixed(amount), active); }
 
-// A number of the ledger that most collisions add to: kept in registers and added once, for all cores would wait for its place.
+#define LEDGER_EXIT 0 // -x, +x, -y, +y, -z, +z
+#define LEDGER_ABSORBED 6
+#define LEDGER_LOST 7
+#define LEDGER_SPECULAR 8
+#define LEDGER_GATED 9
+#define LEDGER_UNSCATTERED 10 // -z, +z
+#define LEDGER_SCATTERINGS 12 // a count, like the next three
+#define LEDGER_FAULTS 13
+#define LEDGER_BROKEN 14
+#define LEDGER_MISSED 15
+#define LEDGER_PATH 16 // in units of params->path_unit_mm
+#define LEDGER_BINS 17 // -z by radius and angle, then +z
+
+// What an item adds to the ledger's first numbers: kept to itself and added once, for all cores would wait for their places.
+typedef struct { ULong sums[LEDGER_SCATTERINGS], path; UInt scatterings; } Gains;
+
+static inline Gains no_gains(void) {
+    Gains g;
+    for (int i = 0; i < LEDGER_SCATTERINGS; i++) g.sums[i] = (ULong)(0);
+    g.path = (ULong)(0), g.scatterings = (UInt)(0u);
+    return g;
+}
+
 static inline void gain(ULong *sum, Real amount, Mask active) { *sum += fixed(select((Real)(0.0f), amount, active)); }
+
+static inline void gains_flush(global ulong *ledger, const Gains *g) {
+    for (int i = 0; i < LEDGER_SCATTERINGS; i++) tally_fixed(ledger, (Int)(i), g->sums[i], (Mask)(-1));
+    tally_fixed(ledger, (Int)(LEDGER_SCATTERINGS), to_ulong(g->scatterings), (Mask)(-1));
+    tally_fixed(ledger, (Int)(LEDGER_PATH), g->path, (Mask)(-1));
+}

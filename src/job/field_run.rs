@@ -20,14 +20,14 @@ pub const PICTURES_ON_THE_WAY: u32 = BATCHES.ilog2();
 
 /// Histories of a work-item where items are many: enough that launching an item does not count.
 const HISTORIES_PER_ITEM: usize = 32;
-/// Working items for each core of a CPU: two, so that a core that was held up is waited for less.
-const ITEMS_PER_CORE: usize = 2;
+/// Times that an item with a grid of its own comes for histories, if all are as fast: so that none works long after the others.
+const SHARES_PER_ITEM: u64 = 64;
 /// The grids of all items together take at most this.
 const OWN_GRIDS_BYTES: usize = 1 << 27;
 
 /// How many items work at a time with a grid each, where lanes say that the device is a CPU and the grids fit.
 fn own_grids(info: &DeviceInfo, cells: usize) -> Option<usize> {
-    let items = ITEMS_PER_CORE * info.compute_units as usize;
+    let items = info.compute_units as usize;
     (info.lanes > 1 && 8 * cells * items <= OWN_GRIDS_BYTES).then_some(items)
 }
 
@@ -62,7 +62,8 @@ impl FieldRun {
         let pass = device.allocate(size_of::<FieldPass>())?;
         let grids = own_grids(device.info(), plan.cells);
         let grid = device.upload(&vec![0; 8 * plan.cells * grids.unwrap_or(1)], 0)?;
-        let ledger = device.upload(&vec![0; 8 * plan.ledger], 0)?;
+        // Behind the ledger is the number of histories that items have taken.
+        let ledger = device.upload(&vec![0; 8 * (plan.ledger + 1)], 0)?;
         let ledger_before = vec![0; plan.ledger];
         let (ledgers, done, device_time) = (Vec::new(), 0, Duration::ZERO);
         let pace = Pace::new(device.info(), 1.0, None);
@@ -101,14 +102,15 @@ impl FieldRun {
     pub fn slice(&mut self, context: &mut DeviceContext, slice: Duration) -> Result<bool> {
         let info = context.device.info();
         let (stride, wanted) = match self.grids {
-            // A few items with many histories each: their lanes are refilled until the last.
+            // A few items that take histories as long as there are any: their lanes are refilled until the last.
             Some(grids) => (info.local_size, grids),
             None => (1, self.pace.items(info, slice, HISTORIES_PER_ITEM)),
         };
         let end = self.batch_end(self.ledgers.len());
         let fits = self.pace.items(info, slice, 1) as u64;
         let count = fits.max(wanted as u64).min(end - self.done);
-        let per_item = count.div_ceil(wanted as u64).max(u64::from(info.lanes));
+        let shares = wanted as u64 * if self.grids.is_some() { SHARES_PER_ITEM } else { 1 };
+        let per_item = count.div_ceil(shares).max(u64::from(info.lanes));
         let seed = self.field.seed();
         let pass = FieldPass {
             first: [self.done as u32, (self.done >> 32) as u32],
@@ -116,10 +118,12 @@ impl FieldRun {
             per_item: per_item as u32,
             stride: stride as u32,
             own_grids: self.grids.is_some().into(),
+            taken_at: self.plan.ledger as i32,
             seed: [seed as u32, (seed >> 32) as u32],
         };
         context.device.write(&mut self.pass, 0, bytemuck::bytes_of(&pass))?;
-        let items = count.div_ceil(per_item) as usize * stride;
+        context.device.write(&mut self.ledger, 8 * self.plan.ledger, &[0; 8])?;
+        let items = wanted.min(count.div_ceil(per_item) as usize) * stride;
         let arguments = [&self.pass, &self.parameters, &self.table, &self.grid, &self.ledger];
         let took = context.device.run(&self.plan.variant, &arguments, items)?;
         self.pace.learn(count as usize, 1, took);

@@ -9,12 +9,14 @@ device_struct! {
         pub first: [u32; 2],
         /// Histories in this launch.
         pub count: u32,
-        /// Histories of a work-item.
+        /// Histories that a work-item takes at a time.
         pub per_item: u32,
         /// One work-item in so many works.
         pub stride: u32,
-        /// Whether each working item has a grid of its own.
+        /// Whether each working item has a grid of its own, and takes histories until there are no more.
         pub own_grids: i32,
+        /// Where in the ledger it says how many have been taken.
+        pub taken_at: i32,
         /// The seed, low and high word.
         pub seed: [u32; 2],
     }
