@@ -14,7 +14,7 @@ static inline int is_launch_due(int free, long taken, long passed) {
 // Collisions in the lanes of `hit`: tells the real ones, deposits, plays the roulette, scatters. Returns the photons that go on.
 static inline Mask collide(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table, Grid *grid,
                            global ulong *ledger, UInt4Lanes r, Real rate, Int medium, Mask hit, Photon *photon, Gains *gains) {
-    photon->depth = select(photon->depth, -log(unit_open(r.c)), hit);
+    photon->depth = select(photon->depth, free_depth(r.c), hit);
     Mask real = hit;
     Medium m = medium_all(params, table, medium);
     Real sigma = rate;
@@ -37,21 +37,23 @@ static inline Mask collide(constant const FieldPass *pass, constant const Photon
     }
 #endif
     Real absorbed = photon->weight * (1.0f - m.albedo);
+    ULong absorbed_fixed = fixed(select((Real)(0.0f), absorbed, real));
     if (params->tally != TALLY_FLUENCE_TRACK && params->tally != TALLY_ABSORBED_TRACK) {
 #if REACHES
         Int voxel = cell_voxel(params, cell_within(params, photon->cell, photon->reach, photon->p));
 #else
         Int voxel = VOXEL_WALLS ? cell_voxel(params, photon->cell) : voxel_at(params, photon->p);
 #endif
-        Real amount = absorbed;
-        if (params->tally == TALLY_FLUENCE) amount = photon->weight * params->deposit_scale / sigma;
+        ULong amount = absorbed_fixed;
+        if (params->tally == TALLY_FLUENCE) amount = fixed(photon->weight * params->deposit_scale / sigma);
         if (params->tally == TALLY_GATHER) {
             Real3 to = real3(params->eye_mm[0] - photon->p.x, params->eye_mm[1] - photon->p.y, params->eye_mm[2] - photon->p.z);
-            amount = photon->weight * params->deposit_scale / sigma * phase_density(table, &m, one_minus_cosine(photon->d, scale3(to, rsqrt(fmax(dot3(to, to), (Real)(1e-20f))))));
+            Real towards = phase_density(table, &m, one_minus_cosine(photon->d, scale3(to, rsqrt(fmax(dot3(to, to), (Real)(1e-20f))))));
+            amount = fixed(photon->weight * params->deposit_scale / sigma * towards);
         }
         deposit(params, grid, voxel, photon->p, amount, real);
     }
-    gain(&gains->sums[LEDGER_ABSORBED], absorbed, real);
+    gains->sums[LEDGER_ABSORBED] += absorbed_fixed;
     gains->scatterings += as_UInt(select((Int)(0), (Int)(1), real));
     Real left = photon->weight - absorbed;
     Mask faint = MASK(fabs(left) < params->roulette_threshold) & real;
@@ -93,7 +95,7 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
     Photon photon;
     photon.p = photon.d = real3(0.0f, 0.0f, 0.0f);
     photon.cell.x = photon.cell.y = photon.cell.z = photon.medium = photon.reach = photon.scatterings = (Int)(0);
-    photon.weight = photon.depth = photon.optical = (Real)(0.0f);
+    photon.weight = photon.depth = photon.optical = photon.path = (Real)(0.0f);
     photon.energy = (Real)(params->source_kev);
     photon.number = photon.event = (UInt)(0u);
     Draws draws;
@@ -129,6 +131,8 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
             photon.cell.z = select(photon.cell.z, launched.cell.z, fresh);
             photon.weight = select(photon.weight, launched.weight, fresh), photon.depth = select(photon.depth, launched.depth, fresh);
             photon.optical = select(photon.optical, launched.optical, fresh);
+            gain_path(params, &photon, fresh, &gains);
+            photon.path = select(photon.path, (Real)(0.0f), fresh);
             photon.number = as_UInt(select(as_Int(photon.number), as_Int(launched.number), fresh));
             photon.event = as_UInt(select(as_Int(photon.event), as_Int(launched.event), fresh));
             photon.scatterings = select(photon.scatterings, (Int)(0), fresh);
@@ -175,23 +179,25 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
 #endif
         Mask late = (Mask)(0);
         if (params->gate_mm < 1e30f) {
-            Real index = index_of(params, table, medium), room = fmax((params->gate_mm - photon.optical) / index, (Real)(0.0f));
-            late = alive & MASK(t > room);
-            t = fmin(t, room);
+            Real index = index_of(params, table, medium);
+            late = alive & MASK(mad(index, t, photon.optical) > params->gate_mm);
+            if (any_lane(late)) {
+                t = select(t, fmax((params->gate_mm - photon.optical) / index, (Real)(0.0f)), late);
+                hit &= ~late;
+            }
             photon.optical = mad(index, t, photon.optical);
-            hit &= ~late;
         }
         if (params->tally == TALLY_FLUENCE_TRACK || params->tally == TALLY_ABSORBED_TRACK) {
 #if VOXEL_WALLS
             Real amount = photon.weight * t * params->deposit_scale;
             if (params->tally == TALLY_ABSORBED_TRACK) amount *= rate * (1.0f - medium_number(params, table, medium, 1));
-            grid_add(&sums, cell_voxel(params, photon.cell), amount, alive);
+            grid_add(&sums, cell_voxel(params, photon.cell), fixed(amount), alive);
 #else
             deposit_track(params, table, &sums, photon.p, photon.d, t, photon.weight, alive);
 #endif
         }
         photon.p = select3(photon.p, along(photon.p, photon.d, t), alive);
-        gains.path += to_ulong(to_uint(select((Real)(0.0f), fmin(rint(t * params->paths_per_mm), (Real)(2e9f)), alive)));
+        photon.path += select((Real)(0.0f), t, alive);
         photon.depth = select(photon.depth, fmax(mad(-rate, t, photon.depth), (Real)(0.0f)), alive & ~hit);
 
         Mask crosses = alive & ~hit & ~late & at_wall, gone = late;
@@ -215,5 +221,6 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
         }
     }
     if (sums.own) grid_flush(&sums);
+    gain_path(params, &photon, (Mask)(-1), &gains);
     gains_flush(ledger, &gains);
 }

@@ -25,18 +25,18 @@ static inline void grid_flush(Grid *g) {
     for (int i = 0; i < LANES; i++) g->sums[g->to.lane[i]] += g->amount.lane[i];
 }
 
-static inline void grid_add(Grid *g, Int voxel, Real amount, Mask active) {
+static inline void grid_add(Grid *g, Int voxel, ULong amount, Mask active) {
     if (!g->own) {
-        tally_fixed(g->sums, voxel, fixed(amount), active);
+        tally_fixed(g->sums, voxel, amount, active);
         return;
     }
     grid_flush(g);
-    g->to.v = select(g->idle, voxel, active), g->amount.v = fixed(amount) & as_ULong(to_long(active));
+    g->to.v = select(g->idle, voxel, active), g->amount.v = amount & as_ULong(to_long(active));
     for (int i = 0; i < LANES; i++) FETCH_TO_WRITE(&g->sums[g->to.lane[i]]);
 }
 
 // Adds a collision's deposit to the grid.
-static inline void deposit(constant const PhotonTransport *params, Grid *grid, Int voxel, Real3 p, Real amount, Mask hit) {
+static inline void deposit(constant const PhotonTransport *params, Grid *grid, Int voxel, Real3 p, ULong amount, Mask hit) {
     // Layers and boundaries that have no end reach further than the grid.
     if (params->endless) {
         hit &= MASK(p.x >= 0.0f) & MASK(p.x <= params->size_mm[0]) & MASK(p.y >= 0.0f) & MASK(p.y <= params->size_mm[1]);
@@ -69,7 +69,7 @@ static inline void deposit_track(constant const PhotonTransport *params, global 
                 Int medium = medium_of(params, table, c, middle);
                 amount *= extinction_at(params, table, medium, c, middle) * (1.0f - medium_number(params, table, medium, 1));
             }
-            grid_add(grid, voxel, amount, inside);
+            grid_add(grid, voxel, fixed(amount), inside);
         }
         Mask in_x = on & MASK(tx <= to), in_y = on & MASK(ty <= to), in_z = on & MASK(tz <= to);
         x += select((Int)(0), up_x + up_x - 1, in_x), y += select((Int)(0), up_y + up_y - 1, in_y), z += select((Int)(0), up_z + up_z - 1, in_z);

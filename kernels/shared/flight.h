@@ -38,8 +38,6 @@ static inline UInt4Lanes draw(constant const View *view, const Flight *f, uint w
     return philox(ctr, view->seed[0], view->seed[1]);
 }
 
-static inline Real free_depth(UInt bits) { return -log(unit_open(bits)); }
-
 static inline Medium phase_of(constant const Scattering *params) {
     Medium m;
     m.extinction = m.albedo = (Real)(1.0f);

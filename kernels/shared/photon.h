@@ -6,6 +6,7 @@ typedef struct {
     Real weight;
     Real depth;          // what is left of the free path, in optical depth
     Real optical;        // path times refractive index so far
+    Real path;
     Real energy;         // of a gamma photon, keV
     UInt number, event;  // key its random numbers; the number is that in this launch
     Int scatterings;
@@ -60,13 +61,19 @@ static inline UInt4Lanes draw_ahead(constant const FieldPass *pass, const Photon
 #define SOURCE_CONE 4
 #define SOURCE_DIFFUSE 5
 
+// Adds the paths of photons that have ended.
+static inline void gain_path(constant const PhotonTransport *params, const Photon *photon, Mask ended, Gains *gains) {
+    Real path = select((Real)(0.0f), fmin(photon->path * params->paths_per_mm, (Real)(1e15f)), ended);
+    gains->path += as_ULong(to_long(rint(path)));
+}
+
 // Where and whither a source sends the photon.
 static inline void launch(constant const FieldPass *pass, constant const PhotonTransport *params, Photon *photon) {
     UInt4Lanes r = draw(pass, photon, 0);
     constant const float *at = params->source, *axis = params->source_axis;
     photon->p = real3(at[0], at[1], at[2]);
     photon->d = real3(axis[0], axis[1], axis[2]);
-    photon->depth = -log(unit_open(r.c));
+    photon->depth = free_depth(r.c);
     Real u = unit_open(r.a), v = unit_open(r.b);
     if (params->source_type == SOURCE_ISOTROPIC || params->source_type == SOURCE_CONE) {
         Real one_minus = u * (1.0f - params->source_cos_from);

@@ -32,3 +32,13 @@ static inline void philox_two(UInt4Lanes *a, UInt4Lanes *b, uint key0, uint key1
 
 // Strictly inside (0, 1): 23 bits and a half, so that neither log(u) nor log(1 - u) is ever infinite.
 static inline Real unit_open(UInt bits) { return mad(to_real(bits >> 9), 1.1920928955078125e-7f, 5.9604644775390625e-8f); }
+
+// A free path in optical depth, -ln(u), to 1e-7 of it: u = m 2^e with m from sqrt(1/2) to sqrt(2), and
+// ln(1 + f) = f - f^2 / 2 + f^3 Q(f), with Q fitted to its least greatest relative error, 3e-8.
+static inline Real free_depth(UInt number) {
+    Int bits = as_Int(unit_open(number)), e = (bits - 0x3f3504f3) >> 23;
+    Real f = as_Real(bits - (e << 23)) - 1.0f, q = (Real)(0.0870035961f);
+    q = mad(q, f, (Real)(-0.142674759f)), q = mad(q, f, (Real)(0.149147868f)), q = mad(q, f, (Real)(-0.165775865f));
+    q = mad(q, f, (Real)(0.199630618f)), q = mad(q, f, (Real)(-0.250013381f)), q = mad(q, f, (Real)(0.333339095f));
+    return mad(to_real(e), (Real)(-0.693147181f), -mad(f * f, mad(q, f, (Real)(-0.5f)), f));
+}
