@@ -127,7 +127,8 @@ static inline void see(constant const View *view, constant const EmissionAbsorpt
         Optical o = optical_at(table, span, form, place[i]);
 #if SHADED
         here = at, at = add_fixed3(at, pace);
-        if (!any_lane(MASK(o.alpha > 0.0f))) continue;
+        // Only what is composited is lit.
+        if (!any_lane(MASK(o.alpha > 0.0f) & MASK(r->transmittance > params->transmittance_floor))) continue;
         o.colour = shade(view, narrow_gradient(view, voxels, &places, i, inner_of(here)), GRADIENT_UNIT, p->half_way, o.colour);
 #endif
         composite(params, o, r);
