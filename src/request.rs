@@ -153,8 +153,25 @@ pub struct BudgetRequest {
     pub max_error: Option<f64>,
 }
 
+/// What `make` makes for this `key`, made once and kept for good: schemas are asked for with each request, are few, and take longer to make
+/// than a request to check.
+pub fn kept(key: &str, make: impl FnOnce() -> Value) -> &'static Value {
+    static KEPT: Mutex<Vec<(String, &Value)>> = Mutex::new(Vec::new());
+    let lock = || KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+    let known = lock().iter().find(|(known, _)| known == key).map(|(_, value)| *value);
+    known.unwrap_or_else(|| {
+        let made: &Value = Box::leak(Box::new(make()));
+        lock().push((key.into(), made));
+        made
+    })
+}
+
 /// The JSON Schema of a wire type, self-contained, with closed objects and plain `enum`s.
-pub fn schema_of<T: JsonSchema>() -> Value {
+pub fn schema_of<T: JsonSchema>() -> &'static Value {
+    kept(std::any::type_name::<T>(), make_schema::<T>)
+}
+
+fn make_schema<T: JsonSchema>() -> Value {
     let settings = schemars::generate::SchemaSettings::draft2020_12().with(|s| s.inline_subschemas = true);
     let schema: Schema = SchemaGenerator::new(settings).into_root_schema_for::<T>();
     let mut value = schema.to_value();
@@ -167,7 +184,7 @@ pub fn schema_of<T: JsonSchema>() -> Value {
 
 /// The JSON Schema of `T` without some of its fields.
 pub fn schema_without<T: JsonSchema>(fields: &[&str]) -> Value {
-    let mut schema = schema_of::<T>();
+    let mut schema = schema_of::<T>().clone();
     if let Some(properties) = schema["properties"].as_object_mut() {
         properties.retain(|name, _| !fields.contains(&name.as_str()));
     }
@@ -178,7 +195,7 @@ pub fn schema_without<T: JsonSchema>(fields: &[&str]) -> Value {
 ///
 /// # Errors
 /// [`Error::Invalid`] with every violation, each with its pointer and the permitted range.
-pub fn parse<T: DeserializeOwned>(value: &Value, schema: &Value, at: &str) -> Result<T> {
+pub fn parse<T: DeserializeOwned>(value: &Value, schema: &'static Value, at: &str) -> Result<T> {
     check(value, schema, at)?;
     let value = with_whole_numbers(value);
     T::deserialize(&value)
@@ -202,7 +219,7 @@ fn with_whole_numbers(value: &Value) -> Value {
 ///
 /// # Errors
 /// As [`parse`].
-pub fn check(value: &Value, schema: &Value, at: &str) -> Result<()> {
+pub fn check(value: &Value, schema: &'static Value, at: &str) -> Result<()> {
     let validator = validator(schema)?;
     let violations: Vec<Violation> =
         validator.iter_errors(value).flat_map(|e| violation(&e, schema, at)).take(20).collect();
@@ -210,14 +227,14 @@ pub fn check(value: &Value, schema: &Value, at: &str) -> Result<()> {
 }
 
 /// The compiled schema. They are few, and compiling one takes longer than checking a request.
-fn validator(schema: &Value) -> Result<Arc<jsonschema::Validator>> {
-    static COMPILED: Mutex<Vec<(Value, Arc<jsonschema::Validator>)>> = Mutex::new(Vec::new());
+fn validator(schema: &'static Value) -> Result<Arc<jsonschema::Validator>> {
+    static COMPILED: Mutex<Vec<(&Value, Arc<jsonschema::Validator>)>> = Mutex::new(Vec::new());
     let mut compiled = COMPILED.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some((_, validator)) = compiled.iter().find(|(known, _)| known == schema) {
+    if let Some((_, validator)) = compiled.iter().find(|(known, _)| std::ptr::eq(*known, schema)) {
         return Ok(validator.clone());
     }
     let validator = Arc::new(jsonschema::validator_for(schema).map_err(Error::internal)?);
-    compiled.push((schema.clone(), validator.clone()));
+    compiled.push((schema, validator.clone()));
     Ok(validator)
 }
 

@@ -45,7 +45,7 @@ pub fn candidates(body: &Value, family: Family, features: &Features, error: f64)
 struct Open<'a> {
     own: Map<String, Value>,
     name: &'a str,
-    schema: Value,
+    schema: &'static Value,
 }
 
 impl<'a> Open<'a> {

@@ -78,7 +78,7 @@ pub(crate) fn mean_side(volume: &Volume) -> f64 {
 
 /// The JSON Schema of a technique's own parameters under `limits`.
 pub fn parameters_schema(technique: &Technique, limits: &Limits) -> Value {
-    let mut schema = (technique.schema)();
+    let mut schema = (technique.schema)().clone();
     if let Some(photons) = schema.pointer_mut("/properties/photons/maximum") {
         *photons = limits.max_photons.into();
     }
@@ -86,8 +86,12 @@ pub fn parameters_schema(technique: &Technique, limits: &Limits) -> Value {
 }
 
 /// The JSON Schema of a render request under `limits`: the shared fields and every technique's own.
-pub fn schema(limits: &Limits) -> Value {
-    let mut schema = request::schema_of::<RenderRequest>();
+pub fn schema(limits: &Limits) -> &'static Value {
+    request::kept(&format!("{limits:?}"), || make_schema(limits))
+}
+
+fn make_schema(limits: &Limits) -> Value {
+    let mut schema = request::schema_of::<RenderRequest>().clone();
     let names: Vec<&str> = technique::views().map(|t| t.name).collect();
     schema["properties"]["technique"]["enum"] = names.into_iter().chain([AUTO]).collect();
     for t in technique::views() {
@@ -99,7 +103,7 @@ pub fn schema(limits: &Limits) -> Value {
     }
     schema["properties"]["volume"]["additionalProperties"] = false.into();
     for t in technique::fields() {
-        schema["properties"]["volume"]["properties"][t.name] = (t.schema)();
+        schema["properties"]["volume"]["properties"][t.name] = (t.schema)().clone();
         schema["properties"]["volume"]["properties"][t.name]["properties"]["photons"]["maximum"] =
             limits.max_photons.into();
     }
@@ -120,7 +124,7 @@ impl Scene {
         if !body.is_object() {
             return Err(Error::invalid("", "not an object", "a JSON object with at least technique"));
         }
-        let request: RenderRequest = request::parse(body, &schema(limits), "")?;
+        let request: RenderRequest = request::parse(body, schema(limits), "")?;
         if request.technique == AUTO {
             let permitted = "a technique's name; POST /v1/renders and /v1/plan resolve it";
             return Err(Error::invalid("/technique", "this has to be planned first", permitted));
@@ -174,7 +178,7 @@ impl Scene {
     /// # Errors
     /// [`Error::Invalid`] naming the field under `/camera`.
     pub fn camera_from_json(&self, body: &Value) -> Result<Camera> {
-        let request: CameraRequest = request::parse(body, &request::schema_of::<CameraRequest>(), "/camera")?;
+        let request: CameraRequest = request::parse(body, request::schema_of::<CameraRequest>(), "/camera")?;
         Camera::from_request(Some(&request), &self.framing)
     }
 

@@ -72,7 +72,7 @@ pub struct Technique {
     /// What it computes, in a sentence.
     pub summary: &'static str,
     /// JSON Schema of its own parameters.
-    pub schema: fn() -> Value,
+    pub schema: fn() -> &'static Value,
     /// A request that works as it is.
     pub example: fn() -> Value,
     /// Its kernel and the variants of it.

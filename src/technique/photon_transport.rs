@@ -140,7 +140,7 @@ struct Simulation {
 }
 
 fn parse(parameters: &Value, at: &str, store: &Store) -> Result<Arc<dyn Field>> {
-    let p: Parameters = request::parse(parameters, &(TECHNIQUE.schema)(), at)?;
+    let p: Parameters = request::parse(parameters, (TECHNIQUE.schema)(), at)?;
     let geometry = Geometry::new(&p, store, at)?;
     let source = p.source.resolve(geometry.size_mm, geometry.chamber, &format!("{at}/source"))?;
     if let Some(histogram) = &p.exit_histogram {

@@ -201,7 +201,7 @@ fn source() -> Source {
 }
 
 fn parse(parameters: &Value, at: &str) -> Result<Arc<dyn View>> {
-    let parameters: Parameters = request::parse(parameters, &(TECHNIQUE.schema)(), at)?;
+    let parameters: Parameters = request::parse(parameters, (TECHNIQUE.schema)(), at)?;
     if let Some(window) = &parameters.window {
         window.check(&format!("{at}/window"))?;
     }

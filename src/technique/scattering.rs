@@ -12,7 +12,11 @@ pub(super) use parameters::Parameters;
 pub(super) use plan::{Scatterer, source};
 
 /// The schema of the parameters without those that are not a technique's own, and without phase functions that are not of light.
-pub(super) fn schema(without: &[&str]) -> Value {
+pub(super) fn schema(without: &[&str]) -> &'static Value {
+    request::kept(&format!("scattering without {without:?}"), || make_schema(without))
+}
+
+fn make_schema(without: &[&str]) -> Value {
     let mut schema = request::schema_without::<Parameters>(without);
     let kinds = schema.pointer_mut("/properties/medium/properties/phase/properties/type/enum");
     if let Some(kinds) = kinds.and_then(Value::as_array_mut) {

@@ -40,7 +40,7 @@ pub const TECHNIQUE: Technique = Technique {
     kind: Kind::View(parse),
 };
 
-fn schema() -> Value {
+fn schema() -> &'static Value {
     scattering::schema(&["max_scatterings", "next_event", "roulette_threshold"])
 }
 
@@ -60,6 +60,6 @@ fn source() -> Source {
 }
 
 fn parse(parameters: &Value, at: &str) -> Result<Arc<dyn View>> {
-    let parameters: Parameters = request::parse(parameters, &schema(), at)?;
+    let parameters: Parameters = request::parse(parameters, schema(), at)?;
     Ok(Arc::new(Scatterer::new(TECHNIQUE.name, parameters, at)?))
 }
