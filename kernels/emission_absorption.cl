@@ -3,15 +3,24 @@
 
 typedef struct { Real3 colour; Real transmittance; } Radiance;
 
+// The weight of what is behind all there is, in the lanes whose ray has not ended; what is behind that gets so much less.
+static inline Real weight_of(constant const EmissionAbsorption *params, Real alpha, Radiance *r) {
+    Real weight = select((Real)(0.0f), r->transmittance * alpha, MASK(r->transmittance > params->transmittance_floor));
+    r->transmittance -= weight;
+    return weight;
+}
+
+static inline void add_light(Real3 colour, Real weight, Radiance *r) {
+    r->colour = real3(mad(colour.x, weight, r->colour.x), mad(colour.y, weight, r->colour.y), mad(colour.z, weight, r->colour.z));
+}
+
 // Puts a sample behind (or, back to front, before) what is there, in the lanes whose ray has not ended.
 static inline void composite(constant const EmissionAbsorption *params, Optical o, Radiance *r) {
 #if BACK_TO_FRONT
     r->colour = add3(scale3(r->colour, 1.0f - o.alpha), scale3(o.colour, o.alpha));
     r->transmittance *= 1.0f - o.alpha;
 #else
-    Real weight = select((Real)(0.0f), r->transmittance * o.alpha, MASK(r->transmittance > params->transmittance_floor));
-    r->colour = real3(mad(o.colour.x, weight, r->colour.x), mad(o.colour.y, weight, r->colour.y), mad(o.colour.z, weight, r->colour.z));
-    r->transmittance -= weight;
+    add_light(o.colour, weight_of(params, o.alpha, r), r);
 #endif
 }
 
@@ -116,23 +125,27 @@ static inline void preintegrated_step(constant const View *view, constant const 
 #endif
 
 #if IN_STRIDES
-// What is seen at the steps from k to end - 1, of which the places in the table are known.
+// What is seen at the steps from k to end - 1, of which the places in the table are known. What is lit has a long way from its gradient
+// to its colour: the gradients come in a loop of their own, so that the processor has the light of several steps under way.
 static inline void see(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels, global const uchar *table,
                        const Packet *p, int k, int end, Span span, int form, const Real *place, Radiance *r) {
 #if SHADED
     BlockPlaces places = block_places(view, p->low + p->low_pace * (float)k, p->low_pace);
-    Fixed3 at = fixed3(along(p->start, p->pace, (Real)((float)k))), pace = fixed3_nearest(p->pace), here;
-#endif
-    for (int i = 0; i < end - k; i++) {
+    Fixed3 at = fixed3(along(p->start, p->pace, (Real)((float)k))), pace = fixed3_nearest(p->pace);
+    Real3 colour[STRIDE], gradient[STRIDE];
+    Real weight[STRIDE];
+    int lit = 0;
+    for (int i = 0; i < end - k; i++, at = add_fixed3(at, pace)) {
         Optical o = optical_at(table, span, form, place[i]);
-#if SHADED
-        here = at, at = add_fixed3(at, pace);
-        // Only what is composited is lit.
-        if (!any_lane(MASK(o.alpha > 0.0f) & MASK(r->transmittance > params->transmittance_floor))) continue;
-        o.colour = shade(view, narrow_gradient(view, voxels, &places, i, inner_of(here)), GRADIENT_UNIT, p->half_way, o.colour);
-#endif
-        composite(params, o, r);
+        weight[lit] = weight_of(params, o.alpha, r);
+        if (!any_lane(MASK(weight[lit] > 0.0f))) continue;
+        colour[lit] = o.colour;
+        gradient[lit++] = narrow_gradient(view, voxels, &places, i, inner_of(at));
     }
+    for (int i = 0; i < lit; i++) add_light(shade(view, gradient[i], GRADIENT_UNIT, p->half_way, colour[i]), weight[i], r);
+#else
+    for (int i = 0; i < end - k; i++) composite(params, optical_at(table, span, form, place[i]), r);
+#endif
 }
 
 // The steps from k to end - 1, at most STRIDE, all of them whole: first the values, then what is seen of them. Of two short loops the
