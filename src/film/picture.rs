@@ -99,25 +99,29 @@ impl Film {
 
 /// Writes the pixels' sRGB bytes; how many values were clipped.
 fn encode(pixels: &[f32], background: Background, out: &mut [u8]) -> u64 {
-    let table = srgb_table();
-    let mut clipped = 0;
-    let mut encode = |v: f32| {
-        clipped += u64::from(v > 1.0);
-        table[(v.clamp(0.0, 1.0) * 65535.0 + 0.5) as usize]
-    };
+    let pixels = pixels.chunks_exact(4);
     match background {
         Background::Colour(behind) => {
-            for (p, out) in pixels.chunks_exact(4).zip(out.chunks_exact_mut(3)) {
-                out.copy_from_slice(&over(p, behind).map(&mut encode));
-            }
+            pixels.zip(out.chunks_exact_mut(3)).map(|(p, out)| encode_colour(over(p, behind), out)).sum()
         }
         Background::Transparent => {
-            for (p, out) in pixels.chunks_exact(4).zip(out.chunks_exact_mut(4)) {
+            let encode = |(p, out): (&[f32], &mut [u8])| {
                 let scale = if p[3] > 0.0 { 1.0 / p[3] } else { 0.0 };
-                out[..3].copy_from_slice(&[p[0], p[1], p[2]].map(|v| encode(v * scale)));
                 out[3] = (p[3].clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
-            }
+                encode_colour([p[0] * scale, p[1] * scale, p[2] * scale], &mut out[..3])
+            };
+            pixels.zip(out.chunks_exact_mut(4)).map(encode).sum()
         }
+    }
+}
+
+/// Writes three sRGB bytes; how many values were clipped.
+#[inline(always)]
+fn encode_colour(colour: [f32; 3], out: &mut [u8]) -> u64 {
+    let (table, mut clipped) = (srgb_table(), 0);
+    for (v, byte) in colour.into_iter().zip(out) {
+        clipped += u64::from(v > 1.0);
+        *byte = table[usize::from((v.clamp(0.0, 1.0) * 65535.0 + 0.5) as u16)];
     }
     clipped
 }
@@ -129,12 +133,12 @@ fn over(p: &[f32], behind: [f32; 3]) -> [f32; 3] {
 }
 
 /// sRGB bytes by linear value in steps of 2^-16: a step is a twentieth of a grey level where the curve is steepest.
-fn srgb_table() -> &'static [u8] {
-    static TABLE: std::sync::OnceLock<Vec<u8>> = std::sync::OnceLock::new();
-    TABLE.get_or_init(|| {
+fn srgb_table() -> &'static [u8; 1 << 16] {
+    static TABLE: std::sync::LazyLock<Box<[u8; 1 << 16]>> = std::sync::LazyLock::new(|| {
         let encode = |v: f64| if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
-        (0..=65535).map(|i| (encode(f64::from(i) / 65535.0) * 255.0).round() as u8).collect()
-    })
+        Box::new(std::array::from_fn(|i| (encode(i as f64 / 65535.0) * 255.0).round() as u8))
+    });
+    &TABLE
 }
 
 #[cfg(test)]
