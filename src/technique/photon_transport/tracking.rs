@@ -63,7 +63,7 @@ fn cheapest(p: &Parameters, geometry: &Geometry, track: bool) -> (Tracking, Stri
         return exact("the extinction changes with the energy, so no majorant holds");
     }
     if geometry.bends() {
-        return exact("from voxel to voxel, for light is bent between them");
+        return exact("from wall to wall, for light is bent there");
     }
     if track {
         return exact("from voxel to voxel, where tracks are scored as well");
@@ -79,11 +79,11 @@ fn cheapest(p: &Parameters, geometry: &Geometry, track: bool) -> (Tracking, Stri
     };
     let by_voxels = walls * WALLS_PER_SIDE / voxel_mm + mean(&voxels);
     let by_majorants = mean(&majorants(p, geometry).per_mm);
-    let numbers = format!("{by_majorants:.3} tentative collisions a mm for {by_voxels:.3} voxels and collisions");
+    let numbers = format!("{by_majorants:.3} tentative collisions a mm for {by_voxels:.3} walls and collisions");
     if by_majorants < CLEARLY_LESS * by_voxels && p.majorant.scale >= 1.0 {
         (Tracking::Delta, format!("delta: {numbers}"))
     } else {
-        exact(&format!("from voxel to voxel: delta tracking would make {numbers}"))
+        exact(&format!("from wall to wall: delta tracking would make {numbers}"))
     }
 }
 
