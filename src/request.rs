@@ -274,6 +274,12 @@ fn violation(error: &jsonschema::ValidationError<'_>, schema: &Value, at: &str) 
             };
             one("wrong type".into(), range().map_or(wanted.clone(), |r| format!("{wanted}, {r}")))
         }
+        ValidationErrorKind::OneOfNotValid { .. } | ValidationErrorKind::AnyOf { .. }
+            if !permitted_names(schema, error.instance_path().as_str()).is_empty() =>
+        {
+            let names = permitted_names(schema, error.instance_path().as_str());
+            one("not one of the permitted values".into(), json!(names).to_string())
+        }
         _ => one(error.to_string(), "see the schema in /v1/techniques and /openapi.json".into()),
     }
 }
@@ -296,7 +302,37 @@ fn permitted_range(schema: &Value, path: &str) -> Option<String> {
     }
 }
 
+/// What a value may be that is one of several named ones, each with its description.
+fn permitted_names<'s>(schema: &'s Value, path: &str) -> Vec<&'s Value> {
+    fn names(s: &Value) -> Vec<&Value> {
+        let several = ["oneOf", "anyOf"].into_iter().filter_map(|of| s.get(of)?.as_array()).flatten();
+        s.get("const").into_iter().chain(several.flat_map(names)).collect()
+    }
+    subschema(schema, path).map(names).unwrap_or_default()
+}
+
 fn permitted_fields(schema: &Value, path: &str) -> String {
     let names = |s: &Value| Some(s.get("properties")?.as_object()?.keys().cloned().collect::<Vec<_>>().join(", "));
     subschema(schema, path).and_then(names).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::technique;
+
+    #[test]
+    fn who_names_what_there_is_not_is_told_what_there_is() {
+        let schema = technique::find("projection").map(|t| (t.schema)()).unwrap_or_default();
+        for (field, one_of_them) in [("mode", "xray"), ("interpolation", "trilinear")] {
+            let found = match check(&json!({field: "maximal"}), schema, "/projection") {
+                Err(Error::Invalid(violations)) => violations,
+                _ => Vec::new(),
+            };
+            let pointers: Vec<&str> = found.iter().map(|v| v.pointer.as_str()).collect();
+            assert_eq!(pointers, [format!("/projection/{field}")]);
+            let permitted = found[0].permitted.clone().unwrap_or_default();
+            assert!(permitted.contains(&format!("\"{one_of_them}\"")) && !permitted.contains("schema"), "{permitted}");
+        }
+    }
 }
