@@ -156,13 +156,19 @@ pub struct BudgetRequest {
 /// What `make` makes for this `key`, made once and kept for good: schemas are asked for with each request, are few, and take longer to make
 /// than a request to check.
 pub fn kept(key: &str, make: impl FnOnce() -> Value) -> &'static Value {
-    static KEPT: Mutex<Vec<(String, &Value)>> = Mutex::new(Vec::new());
+    static KEPT: Mutex<Vec<(String, &'static Value)>> = Mutex::new(Vec::new());
+    let find = |kept: &[(String, &'static Value)]| kept.iter().find(|(known, _)| known == key).map(|(_, value)| *value);
     let lock = || KEPT.lock().unwrap_or_else(PoisonError::into_inner);
-    let known = lock().iter().find(|(known, _)| known == key).map(|(_, value)| *value);
+    let known = find(&lock());
     known.unwrap_or_else(|| {
-        let made: &Value = Box::leak(Box::new(make()));
-        lock().push((key.into(), made));
-        made
+        // Not under the lock: making one asks for others. Of two that are made at a time the first stays.
+        let made = make();
+        let mut kept = lock();
+        find(&kept).unwrap_or_else(|| {
+            let made: &Value = Box::leak(Box::new(made));
+            kept.push((key.into(), made));
+            made
+        })
     })
 }
 
@@ -274,13 +280,12 @@ fn violation(error: &jsonschema::ValidationError<'_>, schema: &Value, at: &str) 
             };
             one("wrong type".into(), range().map_or(wanted.clone(), |r| format!("{wanted}, {r}")))
         }
-        ValidationErrorKind::OneOfNotValid { .. } | ValidationErrorKind::AnyOf { .. }
-            if !permitted_names(schema, error.instance_path().as_str()).is_empty() =>
-        {
-            let names = permitted_names(schema, error.instance_path().as_str());
-            one("not one of the permitted values".into(), json!(names).to_string())
-        }
-        _ => one(error.to_string(), "see the schema in /v1/techniques and /openapi.json".into()),
+        _ => match permitted_names(schema, error.instance_path().as_str()) {
+            names if names.is_empty() => {
+                one(error.to_string(), "see the schema in /v1/techniques and /openapi.json".into())
+            }
+            names => one("not one of the permitted values".into(), json!(names).to_string()),
+        },
     }
 }
 

@@ -1,8 +1,8 @@
 // Walls: how far ahead they are, and what becomes of photons that have come to one.
 
 // Counts what leaves the box by a face, by its radius from the beam's axis and its angle to the face.
-static inline void leave(constant const PhotonTransport *params, global const float *table, global ulong *ledger, Gains *gains, const Photon *photon,
-                         int axis, Mask up, Mask gone) {
+static inline void leave(constant const PhotonTransport *params, global const float *table, global ulong *ledger, Gains *gains,
+                         const Photon *photon, int axis, Mask up, Mask gone) {
     gain(&gains->sums[LEDGER_EXIT + 2 * axis], photon->weight, gone & ~up);
     gain(&gains->sums[LEDGER_EXIT + 2 * axis + 1], photon->weight, gone & up);
     if (axis != 2) return;
@@ -22,8 +22,8 @@ static inline void leave(constant const PhotonTransport *params, global const fl
 }
 
 // Takes photons over a wall across one axis, or back from it; returns those that left the box.
-static inline Mask cross_wall(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table, global ulong *ledger, Gains *gains,
-                              int axis, Real wall, Mask in, Photon *photon) {
+static inline Mask cross_wall(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table,
+                              global ulong *ledger, Gains *gains, int axis, Real wall, Mask in, Photon *photon) {
     Real d = axis == 0 ? photon->d.x : axis == 1 ? photon->d.y : photon->d.z;
     Int here = axis == 0 ? photon->cell.x : axis == 1 ? photon->cell.y : photon->cell.z;
     Mask up = MASK(d > 0.0f), back = (Mask)(0);
@@ -104,8 +104,8 @@ static inline Mask cross_inner(constant const PhotonTransport *params, int axis,
 }
 
 // Takes photons that have come to their nearest wall over it; returns those that left the box.
-static inline Mask cross(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table, global ulong *ledger, Gains *gains,
-                         const Ahead *a, Mask crosses, Photon *photon) {
+static inline Mask cross(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table, global ulong *ledger,
+                         Gains *gains, const Ahead *a, Mask crosses, Photon *photon) {
     Mask gone = (Mask)(0), in_x = crosses & MASK(a->distance.x == a->nearest);
     Mask in_y = crosses & ~in_x & MASK(a->distance.y == a->nearest), in_z = crosses & ~in_x & ~in_y;
 #if REACHES

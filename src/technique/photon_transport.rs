@@ -188,7 +188,7 @@ fn parse(parameters: &Value, at: &str, store: &Store) -> Result<Arc<dyn Field>> 
         format!("photon_transport: estimator {estimator}: {why}"),
         "photon_transport: roulette in place of an energy cut-off".into(),
     ];
-    Ok(Arc::new(Simulation {
+    let simulation = Simulation {
         parameters: p,
         geometry,
         extinction_range_per_mm,
@@ -197,7 +197,10 @@ fn parse(parameters: &Value, at: &str, store: &Store) -> Result<Arc<dyn Field>> 
         tracking_reason,
         track,
         reasons,
-    }))
+    };
+    // Here, not on the device's thread.
+    simulation.reach();
+    Ok(Arc::new(simulation))
 }
 
 impl Field for Simulation {

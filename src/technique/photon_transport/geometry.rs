@@ -1,5 +1,7 @@
 //! Where which medium is: in the whole box, in layers, by a label volume or by a density.
 
+use std::sync::OnceLock;
+
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::json;
@@ -39,8 +41,8 @@ pub enum Where {
     Labels {
         /// Its number.
         of_voxel: Vec<u16>,
-        /// How far around it is the same: see [`reaches`].
-        reach: Vec<u8>,
+        /// See [`Geometry::reach`].
+        reach: OnceLock<Vec<u8>>,
     },
     /// The medium's extinction times this.
     Density(Vec<f32>),
@@ -187,8 +189,7 @@ impl Geometry {
                     format!("whole numbers from 0 to {}", media.len() - 1),
                 )
             })?;
-        let reach = reaches(&of_voxel, dims);
-        let place = Where::Labels { of_voxel, reach };
+        let place = Where::Labels { of_voxel, reach: OnceLock::new() };
         Ok(Self { place, media: media.to_vec(), size_mm, dims, chamber: false })
     }
 
@@ -242,6 +243,14 @@ impl Geometry {
     /// Whether refractive indices differ within it.
     pub fn bends(&self) -> bool {
         self.media.iter().any(|m| m.index != self.media[0].index)
+    }
+
+    /// How far around each voxel its label is the same (see [`reaches`]), for labels: worked out when it is first asked for.
+    pub fn reach(&self) -> Option<&[u8]> {
+        match &self.place {
+            Where::Labels { of_voxel, reach } => Some(reach.get_or_init(|| reaches(of_voxel, self.dims))),
+            _ => None,
+        }
     }
 
     /// Extinction of every voxel, per mm, for the kinds that have voxels.

@@ -118,6 +118,11 @@ impl Simulation {
         device.walls_per_mm = std::array::from_fn(|a| if device.walls[a] > 1 { 1.0 / device.wall_mm[a] } else { 0.0 });
     }
 
+    /// How far around each voxel a photon need not look again. Tracks are scored voxel by voxel.
+    pub(super) fn reach(&self) -> Option<&[u8]> {
+        if self.tracking == Tracking::Exact && !self.track { self.geometry.reach() } else { None }
+    }
+
     fn bounds(&self, device: &mut PhotonTransport) {
         let p = &self.parameters;
         device.high_mm = self.geometry.size_mm.map(|s| s as f32);
@@ -176,15 +181,14 @@ impl Simulation {
                 let ends = ends.iter().map(|e| if e.is_finite() { *e as f32 } else { ENDLESS_MM });
                 device.at_layers = append(&mut table, std::iter::once(0.0).chain(ends));
             }
-            Where::Labels { of_voxel, reach } => {
+            Where::Labels { of_voxel, .. } => {
                 // As bytes where they fit, so that more of them are near; a word more, for words are read from any byte on.
                 let label_bytes = if g.media.len() <= 256 { 1 } else { 2 };
-                let with_reach = self.tracking == Tracking::Exact;
-                let mut bytes = Vec::with_capacity(4 * of_voxel.len());
-                for (label, reach) in of_voxel.iter().zip(reach) {
+                let (with_reach, reach) = (self.tracking == Tracking::Exact, self.reach());
+                let mut bytes = Vec::with_capacity((label_bytes + usize::from(with_reach)) * of_voxel.len() + 8);
+                for (i, label) in of_voxel.iter().enumerate() {
                     bytes.extend(&label.to_le_bytes()[..label_bytes]);
-                    // Tracks are scored voxel by voxel.
-                    bytes.extend(with_reach.then_some(if self.track { 0 } else { *reach }));
+                    bytes.extend(with_reach.then(|| reach.map_or(0, |r| r[i])));
                 }
                 bytes.resize(bytes.len().next_multiple_of(4) + 4, 0);
                 let words = bytes.chunks_exact(4).map(|w| f32::from_le_bytes([w[0], w[1], w[2], w[3]]));

@@ -1,6 +1,6 @@
 //! How free paths are found, and why.
 
-use super::geometry::{Geometry, Where};
+use super::geometry::Geometry;
 use super::parameters::Parameters;
 use crate::error::{Error, Result};
 
@@ -71,12 +71,9 @@ fn cheapest(p: &Parameters, geometry: &Geometry, track: bool) -> (Tracking, Stri
     let mean = |v: &[f32]| v.iter().map(|e| f64::from(*e)).sum::<f64>() / v.len() as f64;
     let voxel_mm = (0..3).map(|a| geometry.size_mm[a] / geometry.dims[a] as f64).sum::<f64>() / 3.0;
     // Where labels are the same around a voxel, walls are further apart.
-    let walls = match &geometry.place {
-        Where::Labels { reach, .. } => {
-            reach.iter().map(|r| 1.0 / (2.0 * f64::from(*r) + 1.0)).sum::<f64>() / reach.len() as f64
-        }
-        _ => 1.0,
-    };
+    let per_voxel =
+        |reach: &[u8]| reach.iter().map(|r| 1.0 / (2.0 * f64::from(*r) + 1.0)).sum::<f64>() / reach.len() as f64;
+    let walls = geometry.reach().map_or(1.0, per_voxel);
     let by_voxels = walls * WALLS_PER_SIDE / voxel_mm + mean(&voxels);
     let by_majorants = mean(&majorants(p, geometry).per_mm);
     let numbers = format!("{by_majorants:.3} tentative collisions a mm for {by_voxels:.3} walls and collisions");
