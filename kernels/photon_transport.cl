@@ -27,7 +27,7 @@ static inline Mask collide(constant const FieldPass *pass, constant const Photon
 #if BLOCK_WALLS
     sigma = extinction_at(params, table, medium, photon->cell, photon->p);
     Mask broken = hit & MASK(sigma > rate * 1.000001f);
-    if (any_lane(broken)) tally_fixed(ledger, (Int)(LEDGER_BROKEN), (ULong)(1), broken);
+    if (any_lane(broken)) tally_fixed(ledger, (Int)(LEDGER_BROKEN), ulong_from((UInt)(1u)), broken);
     Real factor;
     real = real_collisions(sigma, rate, unit_open(r.d), hit, &factor);
     photon->weight = select(photon->weight, photon->weight * factor, hit);
@@ -53,7 +53,7 @@ static inline Mask collide(constant const FieldPass *pass, constant const Photon
         }
         deposit(params, grid, voxel, photon->p, amount, real);
     }
-    gains->sums[LEDGER_ABSORBED] += absorbed_fixed;
+    gains->sums[LEDGER_ABSORBED] = add_ulong(gains->sums[LEDGER_ABSORBED], absorbed_fixed);
     gains->scatterings += as_UInt(select((Int)(0), (Int)(1), real));
     Real left = photon->weight - absorbed;
     Mask faint = MASK(fabs(left) < params->roulette_threshold) & real;
@@ -139,7 +139,7 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
             photon.energy = select(photon.energy, (Real)(params->source_kev), fresh);
             if (any_lane(missed)) {
                 gain(&gains.sums[LEDGER_LOST], photon.weight, missed);
-                tally_fixed(ledger, (Int)(LEDGER_MISSED), (ULong)(1), missed);
+                tally_fixed(ledger, (Int)(LEDGER_MISSED), ulong_from((UInt)(1u)), missed);
             }
 #if REACHES
             look_around(params, table, fresh, &photon);
@@ -216,7 +216,7 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
         Mask fault = alive & (MASK(steps > params->most_steps) | MASK(!(fabs(photon.weight) <= 1e30f)));
         if (any_lane(fault)) {
             gain(&gains.sums[LEDGER_LOST], select((Real)(0.0f), photon.weight, MASK(fabs(photon.weight) <= 1e30f)), fault);
-            tally_fixed(ledger, (Int)(LEDGER_FAULTS), (ULong)(1), fault);
+            tally_fixed(ledger, (Int)(LEDGER_FAULTS), ulong_from((UInt)(1u)), fault);
             alive &= ~fault;
         }
     }

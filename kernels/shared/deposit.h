@@ -16,7 +16,7 @@ static inline Grid grid_at(global ulong *sums, int own, int voxels) {
     g.sums = sums, g.own = own;
     // Lanes that add nothing do so at places of their own: at one place they would wait for each other.
     g.idle = LANE_IDS % (Int)(voxels);
-    g.to.v = g.idle, g.amount.v = (ULong)(0);
+    g.to.v = g.idle, g.amount.v = ulong_zero();
     return g;
 }
 
@@ -31,7 +31,7 @@ static inline void grid_add(Grid *g, Int voxel, ULong amount, Mask active) {
         return;
     }
     grid_flush(g);
-    g->to.v = select(g->idle, voxel, active), g->amount.v = amount & as_ULong(to_long(active));
+    g->to.v = select(g->idle, voxel, active), g->amount.v = ulong_where(active, amount);
     for (int i = 0; i < LANES; i++) FETCH_TO_WRITE(&g->sums[g->to.lane[i]]);
 }
 

@@ -21,7 +21,6 @@
 typedef JOIN(float, LANES_SUFFIX) Real;
 typedef JOIN(int, LANES_SUFFIX) Int;
 typedef JOIN(uint, LANES_SUFFIX) UInt;
-typedef JOIN(ulong, LANES_SUFFIX) ULong;
 typedef Int Mask;
 typedef struct { Real x, y, z; } Real3;
 
@@ -33,11 +32,8 @@ typedef struct { Real x, y, z; } Real3;
 #define to_real(v) JOIN(convert_float, LANES_SUFFIX)(v)
 #define to_int(v) JOIN(convert_int, LANES_SUFFIX)(v)
 #define to_uint(v) JOIN(convert_uint, LANES_SUFFIX)(v)
-#define to_ulong(v) JOIN(convert_ulong, LANES_SUFFIX)(v)
-#define to_long(v) JOIN(convert_long, LANES_SUFFIX)(v)
 #define as_Int(v) JOIN(as_int, LANES_SUFFIX)(v)
 #define as_UInt(v) JOIN(as_uint, LANES_SUFFIX)(v)
-#define as_ULong(v) JOIN(as_ulong, LANES_SUFFIX)(v)
 #define as_Real(v) JOIN(as_float, LANES_SUFFIX)(v)
 
 // A tile of pixels is a packet: neighbours diverge least.
@@ -66,7 +62,6 @@ static inline int any_lane(Mask m) { return any(m); }
 // The address of a lane's element when a vector has to be taken apart (scatter, atomics).
 typedef union { Real v; float lane[LANES]; } RealLanes;
 typedef union { Int v; int lane[LANES]; } IntLanes;
-typedef union { ULong v; ulong lane[LANES]; } ULongLanes;
 
 // How many lanes say yes.
 static inline int count_lanes(Mask m) {
@@ -82,6 +77,43 @@ static inline int count_lanes(Mask m) {
     return count;
 #endif
 }
+
+// ULong: 64 bits a lane, in two vectors of half the lanes each. So no vector is wider than the level's registers: one that is
+// crosses a function's boundary in memory, and compilers do not agree how (clang's -Wpsabi).
+#if LANES == 1
+typedef struct { ulong all; } ULong;
+static inline ULong ulong_zero(void) { ULong r = {0}; return r; }
+static inline ULong ulong_from(UInt v) { ULong r = {v}; return r; }
+static inline ULong ulong_rounded(Real v) { ULong r = {(ulong)(long)rint(v)}; return r; }
+static inline ULong add_ulong(ULong a, ULong b) { ULong r = {a.all + b.all}; return r; }
+static inline ULong ulong_where(Mask m, ULong v) { ULong r = {v.all & (ulong)(long)m}; return r; }
+#else
+#if LANES == 16
+#define HALF 8
+#elif LANES == 8
+#define HALF 4
+#else
+#define HALF 2
+#endif
+typedef JOIN(ulong, HALF) HalfULong;
+#define to_half_long(v) JOIN(convert_long, HALF)(v)
+#define to_half_ulong(v) JOIN(convert_ulong, HALF)(v)
+#define as_half_ulong(v) JOIN(as_ulong, HALF)(v)
+typedef struct { HalfULong low, high; } ULong;
+static inline ULong ulong_zero(void) { ULong r = {(HalfULong)(0), (HalfULong)(0)}; return r; }
+static inline ULong ulong_from(UInt v) { ULong r = {to_half_ulong(v.lo), to_half_ulong(v.hi)}; return r; }
+static inline ULong ulong_rounded(Real v) {
+    Real whole = rint(v);
+    ULong r = {as_half_ulong(to_half_long(whole.lo)), as_half_ulong(to_half_long(whole.hi))};
+    return r;
+}
+static inline ULong add_ulong(ULong a, ULong b) { ULong r = {a.low + b.low, a.high + b.high}; return r; }
+static inline ULong ulong_where(Mask m, ULong v) {
+    ULong r = {v.low & as_half_ulong(to_half_long(m.lo)), v.high & as_half_ulong(to_half_long(m.hi))};
+    return r;
+}
+#endif
+typedef union { ULong v; ulong lane[LANES]; } ULongLanes;
 
 // The lesser and the greater of two; b where a is not a number.
 #define LESSER(a, b) ((a) < (b) ? (a) : (b))

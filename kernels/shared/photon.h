@@ -64,7 +64,7 @@ static inline UInt4Lanes draw_ahead(constant const FieldPass *pass, const Photon
 // Adds the paths of photons that have ended.
 static inline void gain_path(constant const PhotonTransport *params, const Photon *photon, Mask ended, Gains *gains) {
     Real path = select((Real)(0.0f), fmin(photon->path * params->paths_per_mm, (Real)(1e15f)), ended);
-    gains->path += as_ULong(to_long(rint(path)));
+    gains->path = add_ulong(gains->path, ulong_rounded(path));
 }
 
 // Where and whither a source sends the photon.

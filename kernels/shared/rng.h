@@ -4,7 +4,16 @@
 
 typedef struct { UInt a, b, c, d; } UInt4Lanes;
 
-static inline UInt high_product(UInt x, uint m) { return to_uint((to_ulong(x) * (ulong)m) >> 32); }
+// The upper halves of 64-bit products. Lanes in pairs are 64-bit numbers: the product of the even one of each, then of the odd one,
+// each a single instruction (pmuludq) in registers of the lanes' own width.
+#if LANES == 1
+static inline UInt high_product(UInt x, uint m) { return (uint)(((ulong)x * m) >> 32); }
+#else
+static inline UInt high_product(UInt x, uint m) {
+    HalfULong pairs = as_half_ulong(x), even = (pairs & 0xffffffffUL) * (ulong)m, odd = (pairs >> 32) * (ulong)m;
+    return as_UInt((even >> 32) | (odd & 0xffffffff00000000UL));
+}
+#endif
 
 static inline UInt4Lanes philox_round(UInt4Lanes ctr, uint key0, uint key1) {
     UInt hi0 = high_product(ctr.a, 0xD2511F53u), lo0 = ctr.a * 0xD2511F53u;

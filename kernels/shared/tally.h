@@ -1,7 +1,7 @@
 // Sums that do not depend on the order of addition: 64-bit integers in units of 2^-30.
 #define FIXED_ONE 1073741824.0f
 
-static inline ULong fixed(Real amount) { return as_ULong(to_long(rint(amount * FIXED_ONE))); }
+static inline ULong fixed(Real amount) { return ulong_rounded(amount * FIXED_ONE); }
 
 static inline void tally_fixed(global ulong *sums, Int cell, ULong amount, Mask active) {
     IntLanes to, on;
@@ -31,15 +31,17 @@ typedef struct { ULong sums[LEDGER_SCATTERINGS], path; UInt scatterings; } Gains
 
 static inline Gains no_gains(void) {
     Gains g;
-    for (int i = 0; i < LEDGER_SCATTERINGS; i++) g.sums[i] = (ULong)(0);
-    g.path = (ULong)(0), g.scatterings = (UInt)(0u);
+    for (int i = 0; i < LEDGER_SCATTERINGS; i++) g.sums[i] = ulong_zero();
+    g.path = ulong_zero(), g.scatterings = (UInt)(0u);
     return g;
 }
 
-static inline void gain(ULong *sum, Real amount, Mask active) { *sum += fixed(select((Real)(0.0f), amount, active)); }
+static inline void gain(ULong *sum, Real amount, Mask active) {
+    *sum = add_ulong(*sum, fixed(select((Real)(0.0f), amount, active)));
+}
 
 static inline void gains_flush(global ulong *ledger, const Gains *g) {
     for (int i = 0; i < LEDGER_SCATTERINGS; i++) tally_fixed(ledger, (Int)(i), g->sums[i], (Mask)(-1));
-    tally_fixed(ledger, (Int)(LEDGER_SCATTERINGS), to_ulong(g->scatterings), (Mask)(-1));
+    tally_fixed(ledger, (Int)(LEDGER_SCATTERINGS), ulong_from(g->scatterings), (Mask)(-1));
     tally_fixed(ledger, (Int)(LEDGER_PATH), g->path, (Mask)(-1));
 }
