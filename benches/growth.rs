@@ -103,8 +103,7 @@ fn draw(file: &str, title: &str, x: &str, lines: &[Line]) {
 /// What building the macro-cells of a 256³ byte volume costs, milliseconds.
 fn cells() -> f64 {
     device::keep_compiled_kernels_in(&common::kernel_cache()).unwrap();
-    let mut device =
-        Device::open(&DeviceConfig { wish: "pocl".into(), lanes: None, kernels: None, images: None }).unwrap();
+    let mut device = Device::open(&DeviceConfig::pocl()).unwrap();
     let voxels = device.upload(&synthetic(256), 8).unwrap();
     let build = || {
         let started = Instant::now();

@@ -30,6 +30,9 @@ pub struct DeviceArgs {
     /// Read kernels from this folder instead of the binary (development)
     #[arg(long, env = "CLOUDCHAMBER_KERNELS")]
     pub kernels: Option<PathBuf>,
+    /// This program, where it may start processes of itself that compile kernels ahead.
+    #[arg(skip)]
+    pub compiler: Option<PathBuf>,
 }
 
 fn parse_lanes(text: &str) -> Result<u32, String> {
@@ -55,6 +58,8 @@ impl DeviceArgs {
             lanes: self.lanes,
             kernels: self.kernels.clone(),
             images: self.volume_images,
+            compiler: self.compiler.clone(),
+            ..DeviceConfig::pocl()
         }
     }
 }

@@ -91,6 +91,17 @@ pub enum Error {
         /// Seconds after which a place is likely.
         retry_after_s: u64,
     },
+    /// A kernel does not build on this device: what needs it cannot be had here, everything else can.
+    #[error(
+        "the kernel '{variant}' does not build on this device with {lanes} lanes, so what needs it cannot be rendered here; everything \
+        else can. Another technique or option may do, or a server that is started with other --lanes or another --device; its log has the compiler's words"
+    )]
+    Kernel {
+        /// The kernel's name and features.
+        variant: String,
+        /// Lanes that it was built for.
+        lanes: u32,
+    },
     /// The service is starting or draining.
     #[error("{0}")]
     Unavailable(String),
@@ -134,6 +145,7 @@ impl Error {
             Self::QueueFull { .. } => (429, "Too many renders"),
             Self::StreamsFull { .. } => (429, "Too many streams"),
             Self::Internal(_) => (500, "Internal error"),
+            Self::Kernel { .. } => (501, "Kernel not available"),
             Self::Unavailable(_) => (503, "Unavailable"),
         }
     }

@@ -9,7 +9,7 @@ use cloudchamber::config::{Config, DeviceArgs, Limits};
 use cloudchamber::device;
 use cloudchamber::error::{Error, Result};
 use cloudchamber::http::Server;
-use cloudchamber::job::{Engine, State};
+use cloudchamber::job::{self, Engine, State};
 use cloudchamber::plan::{Calibrations, Planner};
 use cloudchamber::scene::Scene;
 use cloudchamber::study;
@@ -37,6 +37,9 @@ enum Command {
     Study(Box<StudyArgs>),
     /// Show the OpenCL devices here and the one that would be used
     Device(Box<ShowArgs>),
+    /// Compile kernels for a server (which starts this itself): a label a line in, what came of it a line out
+    #[command(hide = true)]
+    Compile(Box<DeviceArgs>),
     /// Exit 0 if the server at the address answers
     Healthcheck {
         /// Address of the server
@@ -121,6 +124,7 @@ fn run(command: Command) -> Result<()> {
         Command::Render(args) => Some(&args.device),
         Command::Study(args) => Some(&args.device),
         Command::Device(args) => Some(&args.device),
+        Command::Compile(device) => Some(&**device),
         Command::Healthcheck { .. } => None,
     };
     if let Some(device) = device {
@@ -129,13 +133,14 @@ fn run(command: Command) -> Result<()> {
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().map_err(Error::internal)?;
     let result = runtime.block_on(async {
         match command {
-            Command::Serve(config) => serve(&config).await,
+            Command::Serve(config) => serve(*config).await,
             Command::Render(args) => render(&args).await,
             Command::Study(args) => {
                 tokio::task::spawn_blocking(move || run_studies(&args)).await.map_err(Error::internal)?
             }
             Command::Device(args) if args.variants => show_variants(&args.device),
             Command::Device(args) => show_devices(&args.device),
+            Command::Compile(device) => job::compile_kernels(&device.device_config()),
             Command::Healthcheck { listen } => client::healthcheck(&format!("http://{listen}")).await,
         }
     });
@@ -144,16 +149,19 @@ fn run(command: Command) -> Result<()> {
     result
 }
 
-async fn serve(config: &Config) -> Result<()> {
+async fn serve(mut config: Config) -> Result<()> {
+    config.device.compiler = std::env::current_exe().ok();
     // Before the device: the LLVM inside PoCL handles SIGTERM too. Handlers that it finds it passes the signal on to; one that
     // comes after it calls LLVM's first, which ends the process.
     let stop = stop_signal()?;
-    let server = Server::bind(config).await?;
+    let server = Server::bind(&config).await?;
     println!("Cloudchamber listens on http://{}", server.address()?);
     let engine = server.engine().clone();
     tokio::spawn(async move {
         match engine.ready().await {
-            Ok(info) => println!("ready on {} / {}, {} lanes", info.platform, info.device, info.lanes),
+            Ok(info) => {
+                println!("ready on {} / {}, {} lanes, {}", info.platform, info.device, info.lanes, info.level)
+            }
             Err(error) => eprintln!("cloudchamber: {error}"),
         }
     });
@@ -309,7 +317,9 @@ fn run_studies(args: &StudyArgs) -> Result<()> {
 
 fn show_devices(args: &DeviceArgs) -> Result<()> {
     let all: Vec<_> = device::list(args.lanes)?.into_iter().map(|(_, info)| info).collect();
-    let (_, used) = device::select(&args.device, args.lanes)?;
+    let (_, chosen) = device::select(&args.device, args.lanes)?;
+    // An opened one knows more of itself; one that cannot be opened is shown all the same.
+    let used = device::Device::open(&args.device_config()).map_or(chosen, |device| device.info().clone());
     let text = serde_json::to_string_pretty(&json!({"devices": all, "would_use": used})).map_err(Error::internal)?;
     println!("{text}");
     Ok(())
@@ -326,7 +336,7 @@ fn show_variants(args: &DeviceArgs) -> Result<()> {
                 variant.features.iter().map(|(name, value)| ((*name).into(), json!(value))).collect();
             variants.push(
                 json!({"kernel": variant.kernel, "voxel": variant.voxel.map(|v| format!("{v:?}").to_lowercase()),
-                "features": features, "at_start": i < source.common, "options": variant.options(used.lanes, false)}),
+                "features": features, "at_start": i < source.common, "options": variant.options(used.lanes, false, false)}),
             );
         }
     }

@@ -25,7 +25,7 @@ use common::processes::in_processes;
 
 fn open(lanes: Option<u32>, kernels: Option<&Path>) -> Device {
     device::keep_compiled_kernels_in(&common::kernel_cache()).unwrap();
-    Device::open(&DeviceConfig { wish: "pocl".into(), lanes, kernels: kernels.map(Path::to_owned), images: None })
+    Device::open(&DeviceConfig { lanes, kernels: kernels.map(Path::to_owned), strict: true, ..DeviceConfig::pocl() })
         .unwrap()
 }
 
@@ -84,7 +84,7 @@ fn every_variant_builds_with_warnings_as_errors() {
             for t in technique::ALL {
                 let source = (t.source)();
                 for variant in (source.variants)() {
-                    assert!(variant.options(lanes, false).contains("-Werror"));
+                    assert!(variant.options(lanes, false, true).contains("-Werror"));
                     let built = device.build(&source, &variant);
                     built.unwrap_or_else(|e| panic!("{} with {lanes} lanes: {e}", variant.label()));
                 }
@@ -98,7 +98,7 @@ fn preprocessed(source: &Source, variant: &Variant) -> String {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("program.c");
     std::fs::write(&file, source.text(None).unwrap()).unwrap();
-    let options = variant.options(16, false);
+    let options = variant.options(16, false, true);
     let defines = options.split_whitespace().filter(|o| o.starts_with("-D"));
     let output = Command::new("gcc").args(["-E", "-P"]).args(defines).arg(&file).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

@@ -49,6 +49,11 @@ pub fn sources() -> [Source; 2] {
     ]
 }
 
+/// What a volume of such voxels needs.
+pub fn needed(voxel: VoxelType) -> [Variant; 2] {
+    [variant("cells", voxel), variant("distances", voxel)]
+}
+
 /// The least and greatest voxel that a sample in each cell can read.
 pub struct Cells {
     /// Two voxels a cell, in the volume's own type; where all are NaN the least is above the greatest.

@@ -4,6 +4,7 @@
 
 pub mod cells;
 mod images;
+mod level;
 pub mod program;
 mod select;
 pub mod structs;
@@ -20,7 +21,7 @@ use opencl3::memory::{Buffer as ClBuffer, CL_MEM_READ_WRITE, ClMem, Image};
 use opencl3::program::Program;
 use opencl3::types::{CL_BLOCKING, cl_mem, cl_uchar};
 
-pub use select::{DeviceInfo, list, select};
+pub use select::{DeviceInfo, NO_DEVICE, list, select};
 
 use crate::error::{Error, Result};
 use program::{Source, Variant};
@@ -36,6 +37,17 @@ pub struct DeviceConfig {
     pub kernels: Option<PathBuf>,
     /// Whether views sample volumes as 3D images; by default where the device is a GPU that can.
     pub images: Option<bool>,
+    /// Whether a compiler's warning fails a build: in tests. In service it would take a technique away for nothing.
+    pub strict: bool,
+    /// This program, which compiles kernels ahead in processes of its own where it is given; else each is built when first used.
+    pub compiler: Option<PathBuf>,
+}
+
+impl DeviceConfig {
+    /// The CPU's PoCL with what it likes; each kernel is built when first used.
+    pub fn pocl() -> Self {
+        Self { wish: "pocl".into(), lanes: None, kernels: None, images: None, strict: false, compiler: None }
+    }
 }
 
 /// Bytes on the device: a buffer, or a volume's voxels as a 3D image, which only kernels read.
@@ -69,6 +81,7 @@ pub struct Device {
     id: opencl3::types::cl_device_id,
     kernels: HashMap<Variant, Kernel>,
     overrides: Option<PathBuf>,
+    strict: bool,
 }
 
 fn cl<T>(doing: &str, result: std::result::Result<T, opencl3::error_codes::ClError>) -> Result<T> {
@@ -83,6 +96,12 @@ pub fn leave(code: i32) -> ! {
     let _ = std::io::stdout().flush();
     // SAFETY: takes a number and does not return; files are written through, and no lock matters to a process that ends.
     unsafe { libc::_exit(code) }
+}
+
+/// Lets this process give way to others: one that compiles ahead must not hold up one that renders.
+pub fn give_way() {
+    // SAFETY: takes numbers only; that it may fail changes nothing but the order of work.
+    unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, 5) };
 }
 
 /// Points PoCL's compiled-kernel cache at `cache`, unless the environment names one already, and makes sure that code can be
@@ -123,7 +142,11 @@ impl Device {
         // The 1.x form: PoCL 3.1 and NVIDIA's OpenCL both have it.
         let queue = cl("creating the queue", CommandQueue::create_default(&context, 0))?;
         info.image_formats_3d = images::formats(&context);
-        Ok(Self { info, id: device.id(), context, queue, kernels: HashMap::new(), overrides: config.kernels.clone() })
+        let (kernels, strict) = (HashMap::new(), config.strict);
+        let mut device = Self { info, id: device.id(), context, queue, kernels, overrides: None, strict };
+        device.info.level = level::of(&mut device)?;
+        device.overrides = config.kernels.clone();
+        Ok(device)
     }
 
     /// What the device says of itself.
@@ -131,9 +154,29 @@ impl Device {
         &self.info
     }
 
+    /// Lets the device say what was given up before it was opened so.
+    pub fn note_given_up(&mut self, gave_up: Vec<String>) {
+        self.info.gave_up = gave_up;
+    }
+
     /// Whether a variant is built.
     pub fn is_built(&self, variant: &Variant) -> bool {
         self.kernels.contains_key(variant)
+    }
+
+    /// The options that a variant is built with here.
+    fn options(&self, variant: &Variant) -> String {
+        variant.options(self.info.lanes, self.info.volumes_are_images, self.strict)
+    }
+
+    /// What the compiled form of a variant depends on, as a hash: its text, its options, the device and its driver.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] when a kernel file is missing.
+    pub fn fingerprint(&self, source: &Source, variant: &Variant) -> Result<String> {
+        let (text, info) = (source.text(self.overrides.as_deref())?, &self.info);
+        let all = [&text, &self.options(variant), &info.platform_version, &info.device, &info.driver, info.level];
+        Ok(blake3::hash(all.join("\0").as_bytes()).to_hex()[..32].to_owned())
     }
 
     /// Builds a variant unless it is there already. PoCL compiles for real at the first launch, so a caller that wants it
@@ -147,7 +190,7 @@ impl Device {
         }
         let text = source.text(self.overrides.as_deref())?;
         let mut program = cl("creating a program", Program::create_from_source(&self.context, &text))?;
-        if let Err(code) = program.build(&[self.id], &variant.options(self.info.lanes, self.info.volumes_are_images)) {
+        if let Err(code) = program.build(&[self.id], &self.options(variant)) {
             let log = program.get_build_log(self.id).unwrap_or_default();
             return Err(Error::internal(format!("building {}: {code}\n{log}", variant.label())));
         }

@@ -51,6 +51,10 @@ pub struct DeviceInfo {
     pub int64_atomics: bool,
     /// Rays or photons that one work-item carries here.
     pub lanes: u32,
+    /// The instruction set that kernels are compiled for, such as `AVX2`; known once the device is opened.
+    pub level: &'static str,
+    /// What was tried and failed before this, such as more lanes, in words.
+    pub gave_up: Vec<String>,
     /// Work-items in a work-group here.
     pub local_size: usize,
 }
@@ -70,6 +74,11 @@ const FROM_BUFFERS: &str =
 const FROM_IMAGES: &str = "image: trilinear by the device's sampler, whose weights have 8 fractional bits on a GPU";
 
 impl DeviceInfo {
+    /// Whether it is PoCL's: that compiles at the first launch, and keeps what it compiled for other processes too.
+    pub fn is_pocl(&self) -> bool {
+        self.platform.contains("Portable Computing Language")
+    }
+
     /// Takes volumes as images where `wish` says so, or by default on a GPU that has them; then a work-item is one ray.
     pub(super) fn use_images(&mut self, wish: Option<bool>) {
         self.volumes_are_images = self.image_support && wish.unwrap_or(self.kind == "gpu" && self.lanes == 1);
@@ -79,6 +88,11 @@ impl DeviceInfo {
         }
     }
 }
+
+/// What somebody can do where no OpenCL device can be used.
+pub const NO_DEVICE: &str = "there is no usable OpenCL device: install PoCL for the processor (Debian and Ubuntu: \
+    apt install pocl-opencl-icd ocl-icd-libopencl1 binutils) or the graphics card's OpenCL driver; `cloudchamber device` lists what \
+    there is, --device NAME chooses, and --lanes 4 or --lanes 1 asks for less of the compiler";
 
 fn cl<T>(result: std::result::Result<T, opencl3::error_codes::ClError>) -> Result<T> {
     result.map_err(|e| Error::internal(format!("OpenCL: {e}")))
@@ -130,6 +144,8 @@ fn describe(platform: &Platform, device: &ClDevice, forced_lanes: Option<u32>) -
         volume_sampling: FROM_BUFFERS,
         int64_atomics: cl(device.extensions())?.contains("cl_khr_int64_base_atomics"),
         lanes,
+        level: "",
+        gave_up: Vec::new(),
         // A CPU work-item is already a packet, so a group is only the unit that threads share out; a GPU wants whole warps.
         local_size: if kind == "gpu" { 64 } else { 4 },
     })
@@ -140,7 +156,7 @@ fn describe(platform: &Platform, device: &ClDevice, forced_lanes: Option<u32>) -
 /// # Errors
 /// [`Error::Internal`] when there is no OpenCL at all, with how to install it.
 pub fn list(forced_lanes: Option<u32>) -> Result<Vec<(ClDevice, DeviceInfo)>> {
-    let missing = "no OpenCL platform found: install PoCL (Debian: pocl-opencl-icd and ocl-icd-libopencl1)";
+    let missing = NO_DEVICE;
     // The ICD loader is opened at run time: without it, cl3 panics in its lazy initialiser instead of returning an error.
     let platforms = std::panic::catch_unwind(get_platforms)
         .map_err(|_| Error::internal(missing))?
@@ -165,9 +181,8 @@ pub fn select(wish: &str, forced_lanes: Option<u32>) -> Result<(ClDevice, Device
     let devices = list(forced_lanes)?;
     let names: Vec<String> = devices.iter().map(|(_, i)| format!("{} / {}", i.platform, i.device)).collect();
     let lower = wish.to_lowercase();
-    let is_pocl = |i: &DeviceInfo| i.platform.contains("Portable Computing Language");
     let rank = |i: &DeviceInfo| match lower.as_str() {
-        "pocl" | "cpu" | "" => (i.kind == "cpu").then_some(if is_pocl(i) { 0 } else { 1 }),
+        "pocl" | "cpu" | "" => (i.kind == "cpu").then_some(if i.is_pocl() { 0 } else { 1 }),
         "gpu" => (i.kind == "gpu").then_some(0),
         text => (i.platform.to_lowercase().contains(text) || i.device.to_lowercase().contains(text)).then_some(0),
     };

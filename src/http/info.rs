@@ -10,6 +10,7 @@ use metrics_exporter_prometheus::{PrometheusBuilder, PrometheusHandle};
 use serde_json::{Value, json};
 
 use super::App;
+use crate::device::NO_DEVICE;
 use crate::error::{Error, Result};
 use crate::job::Readiness;
 use crate::{scene, technique};
@@ -35,9 +36,13 @@ pub(super) async fn techniques(State(app): State<App>) -> Json<Value> {
 /// `GET /v1/device`.
 pub(super) async fn device(State(app): State<App>) -> Result<Response> {
     match app.engine.readiness() {
-        Readiness::Ready(info) => Ok(Json(&*info).into_response()),
-        Readiness::Starting => Err(Error::Unavailable("the device is being made ready".into())),
-        Readiness::Failed(cause) => Err(Error::Internal(cause)),
+        Readiness::Ready(info) => {
+            let mut all = serde_json::to_value(&*info).map_err(Error::internal)?;
+            all["kernels"] = json!(app.engine.kernels());
+            Ok(Json(all).into_response())
+        }
+        Readiness::Starting => Err(Error::Unavailable("the device is being opened".into())),
+        Readiness::Failed(_) => Err(Error::Unavailable(NO_DEVICE.into())),
     }
 }
 
@@ -46,19 +51,23 @@ pub(super) async fn healthz() -> Json<Value> {
     Json(json!({"status": "ok"}))
 }
 
-/// `GET /readyz`: kernels are built, there is room in the queue, and the server is not draining.
+/// `GET /readyz`: the first picture can be rendered, there is room in the queue, and the server is not draining. How far other kernels
+/// are, and what was given up, stands beside it.
 pub(super) async fn readyz(State(app): State<App>) -> Result<Json<Value>> {
     if app.engine.is_draining() {
         return Err(Error::Unavailable("the server is shutting down".into()));
     }
     match app.engine.readiness() {
-        Readiness::Starting => Err(Error::Unavailable("kernels are being built".into())),
+        Readiness::Starting => Err(Error::Unavailable("the first kernels are being built".into())),
         Readiness::Failed(cause) => {
             tracing::error!(%cause, "not ready");
-            Err(Error::Unavailable("the device cannot be used; the log says why".into()))
+            Err(Error::Unavailable(NO_DEVICE.into()))
         }
         Readiness::Ready(_) if !app.engine.has_room() => Err(Error::Unavailable("the queue is full".into())),
-        Readiness::Ready(_) => Ok(Json(json!({"status": "ready"}))),
+        Readiness::Ready(info) => {
+            Ok(Json(json!({"status": "ready", "kernels": app.engine.kernels(), "lanes": info.lanes,
+            "level": info.level, "gave_up": info.gave_up})))
+        }
     }
 }
 

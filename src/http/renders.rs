@@ -118,7 +118,9 @@ async fn wait_for(app: &App, job: &Job, last: bool) -> Result<Arc<Frame>> {
         let update = updates.borrow_and_update().clone();
         match (update.state, update.frame) {
             (JobState::Done, Some(frame)) => return Ok(frame),
-            (JobState::Failed, _) => return Err(Error::internal("the render failed")),
+            (JobState::Failed, _) => {
+                return Err(job.failure().unwrap_or_else(|| Error::internal("the render failed")));
+            }
             (JobState::Cancelled, Some(frame)) if !last => return Ok(frame),
             (JobState::Cancelled, _) => return Err(Error::Conflict("the render was cancelled".into())),
             (_, Some(frame)) if !last => return Ok(frame),

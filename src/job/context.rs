@@ -6,12 +6,14 @@ use std::rc::Rc;
 use std::sync::{Arc, Weak};
 use std::time::{Duration, Instant};
 
-use crate::device::cells::{self, Cells};
-use crate::device::program::{Source, Variant};
-use crate::device::{Buffer, Device};
+use super::compile::Compiler;
+use super::kernels::{self, Kernels};
+use super::warm::{first_kernels, is_cached, warm};
+use crate::device::cells::Cells;
+use crate::device::program::Variant;
+use crate::device::{Buffer, Device, DeviceConfig};
 use crate::error::{Error, Result};
-use crate::technique;
-use crate::volume::{Volume, Voxels};
+use crate::volume::Volume;
 
 /// Device memory for volumes that no job uses just now.
 const IDLE_VOLUME_BYTES: usize = 1 << 30;
@@ -57,19 +59,100 @@ pub(super) struct DeviceContext {
     volumes: HashMap<usize, (Weak<Volume>, Rc<DeviceVolume>)>,
     /// Rays a millisecond of the last pass, by kernel variant.
     speed: HashMap<Variant, f64>,
+    kernels: Kernels,
+    /// Whether processes compile them.
+    compiles_ahead: bool,
+}
+
+impl Drop for DeviceContext {
+    fn drop(&mut self) {
+        self.kernels.close();
+    }
 }
 
 impl DeviceContext {
-    /// Builds the common variants of every technique and launches each once on a tiny case: PoCL compiles at the first launch.
-    pub fn warm(mut device: Device) -> Result<Self> {
-        let started = Instant::now();
-        for source in technique::ALL.iter().map(|t| (t.source)()).chain(cells::sources()) {
-            for variant in (source.variants)().iter().take(source.common) {
-                warm(&mut device, &source, variant)?;
+    /// Opens the device with as many lanes as it likes, or with fewer where the first kernels do not build for so many.
+    /// `kernels` is told what is compiled, and compiles ahead from then on; `wake` is called as that goes on.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] when there is no device, or the first kernels build for no number of lanes.
+    pub fn open(config: &DeviceConfig, kernels: Kernels, wake: impl Fn() + Send + Clone + 'static) -> Result<Self> {
+        let mut gave_up: Vec<String> = Vec::new();
+        let mut lanes = config.lanes;
+        loop {
+            let mut device = Device::open(&DeviceConfig { lanes, ..config.clone() })?;
+            let used = device.info().lanes;
+            let started = Instant::now();
+            match first_kernels(&mut device, Compiler::of(config, used).as_ref()) {
+                Ok(()) => {
+                    let (level, ms) = (device.info().level, started.elapsed().as_millis() as u64);
+                    tracing::info!(ms, lanes = used, level, "the first kernels are there");
+                    device.note_given_up(gave_up);
+                    let (volumes, speed) = (HashMap::new(), HashMap::new());
+                    let mut context = Self { device, volumes, speed, kernels, compiles_ahead: false };
+                    context.compile_ahead(config, wake)?;
+                    return Ok(context);
+                }
+                Err(cause) => {
+                    let narrower = [8, 4, 1].into_iter().find(|n| *n < used && config.lanes.is_none());
+                    tracing::error!(lanes = used, %cause, ?narrower, "the first kernels do not build");
+                    gave_up.push(format!("{used} lanes: the first kernels do not build"));
+                    lanes = Some(narrower.ok_or(cause)?);
+                }
             }
         }
-        tracing::info!(ms = started.elapsed().as_millis() as u64, lanes = device.info().lanes, "kernels are warm");
-        Ok(Self { device, volumes: HashMap::new(), speed: HashMap::new() })
+    }
+
+    /// Lets processes compile what is likely to be asked for, where PoCL keeps what they compile; elsewhere the device thread does it
+    /// when it has nothing else to do.
+    fn compile_ahead(&mut self, config: &DeviceConfig, wake: impl Fn() + Send + Clone + 'static) -> Result<()> {
+        for variant in kernels::first() {
+            self.kernels.set(&variant, true);
+        }
+        let Some(compiler) = Compiler::of(config, self.device.info().lanes) else { return Ok(()) };
+        for variant in kernels::common() {
+            self.kernels.ask(&variant, false);
+            if is_cached(&self.device, &variant) {
+                self.kernels.set(&variant, true);
+            }
+        }
+        self.compiles_ahead = self.device.info().is_pocl();
+        if self.compiles_ahead { self.kernels.start(&compiler, wake) } else { Ok(()) }
+    }
+
+    /// Whether a variant can be run now: builds it where it is compiled, or where nobody compiles ahead. One that cannot yet is asked for.
+    ///
+    /// # Errors
+    /// [`Error::Kernel`] for one that does not build on this device.
+    pub fn is_ready(&mut self, variant: &Variant) -> Result<bool> {
+        if self.device.is_built(variant) {
+            return Ok(true);
+        }
+        match self.kernels.is_compiled(variant) {
+            None if self.compiles_ahead => {
+                self.kernels.ask(variant, true);
+                return Ok(false);
+            }
+            Some(false) => {}
+            _ => self.build(variant),
+        }
+        let lanes = self.device.info().lanes;
+        let built = self.device.is_built(variant);
+        if built { Ok(true) } else { Err(Error::Kernel { variant: variant.label(), lanes }) }
+    }
+
+    fn build(&mut self, variant: &Variant) {
+        let built = warm(&mut self.device, variant);
+        if let Err(cause) = &built {
+            tracing::error!(kernel = variant.label(), %cause, "a kernel does not build");
+        }
+        self.kernels.set(variant, built.is_ok());
+    }
+
+    /// Builds one variant that is likely to be asked for, where nobody else does; whether there was one.
+    pub fn build_ahead(&mut self) -> bool {
+        let next = if self.compiles_ahead { None } else { self.kernels.take() };
+        next.inspect(|variant| self.build(variant)).is_some()
     }
 
     /// The volume on the device, uploaded and its cells built at first use.
@@ -120,18 +203,4 @@ impl DeviceContext {
             !drop
         });
     }
-}
-
-/// Builds a variant and launches it once on nothing.
-pub(super) fn warm(device: &mut Device, source: &Source, variant: &Variant) -> Result<()> {
-    if device.is_built(variant) {
-        return Ok(());
-    }
-    device.build(source, variant)?;
-    // Zeroed buffers ask for an image of no pixels or a launch of no histories: compiled, and nothing done.
-    let mut zero: Vec<Buffer> = (0..source.arguments).map(|_| device.upload(&[0; 1024], 0)).collect::<Result<_>>()?;
-    if let (Some(volume), true) = (source.volume, device.info().volumes_are_images) {
-        zero[volume] = device.upload_image(&Voxels::U8(vec![0]), [1; 3])?;
-    }
-    device.run(variant, &zero.iter().collect::<Vec<_>>(), 1).map(drop)
 }

@@ -1,20 +1,19 @@
-//! The engine: admits jobs, keeps them readable, and runs the device thread, which goes round the live ones in slices.
+//! The engine: admits jobs, keeps them readable, and starts the device thread (`device_thread.rs`).
 
 use std::collections::{HashMap, VecDeque};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use serde_json::Value;
 use tokio::sync::watch;
 
-use super::context::DeviceContext;
-use super::live::{Live, Turn};
+use super::device_thread::{Command, DeviceThread};
+use super::kernels::{KernelProgress, Kernels};
 use super::{Job, State, develop};
 use crate::config::Limits;
-use crate::device::{Device, DeviceConfig, DeviceInfo};
+use crate::device::{DeviceConfig, DeviceInfo, NO_DEVICE};
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
@@ -22,22 +21,30 @@ use crate::scene::camera::Camera;
 /// Whether the device is ready to work.
 #[derive(Debug, Clone)]
 pub enum Readiness {
-    /// Kernels are being built and warmed.
+    /// The device is opened, and the first kernels are built.
     Starting,
-    /// Everything is built.
+    /// The first picture can be rendered; other kernels may still be compiled, which [`Engine::kernels`] tells.
     Ready(Arc<DeviceInfo>),
-    /// The device could not be opened or a kernel not be built.
+    /// The device could not be opened, or builds no kernel.
     Failed(String),
 }
 
 struct Inner {
-    commands: Sender<Arc<Job>>,
+    commands: Sender<Command>,
+    kernels: Kernels,
     limits: Limits,
     readiness: watch::Receiver<Readiness>,
     draining: AtomicBool,
     unfinished: AtomicUsize,
     jobs: Mutex<Jobs>,
     runtime: tokio::runtime::Handle,
+}
+
+impl Drop for Inner {
+    fn drop(&mut self) {
+        // A device thread that has ended by itself needs no telling.
+        drop(self.commands.send(Command::Stop));
+    }
 }
 
 #[derive(Default)]
@@ -76,12 +83,15 @@ impl Engine {
         let (commands, incoming) = channel();
         let (readiness, ready) = watch::channel(Readiness::Starting);
         let live = limits.live_renders.max(1);
+        let kernels = Kernels::default();
+        let thread = DeviceThread { config, kernels: kernels.clone(), commands: commands.clone(), most_live: live };
         std::thread::Builder::new()
             .name("device".into())
-            .spawn(move || device_thread(&config, &incoming, &readiness, live))
+            .spawn(move || thread.run(&incoming, &readiness))
             .map_err(Error::internal)?;
         let inner = Inner {
             commands,
+            kernels,
             limits,
             readiness: ready,
             draining: AtomicBool::new(false),
@@ -95,6 +105,11 @@ impl Engine {
     /// Whether the device is ready.
     pub fn readiness(&self) -> Readiness {
         self.inner.readiness.borrow().clone()
+    }
+
+    /// How far the kernels are.
+    pub fn kernels(&self) -> KernelProgress {
+        self.inner.kernels.progress()
     }
 
     /// Waits until the device is ready.
@@ -133,7 +148,7 @@ impl Engine {
             return Err(Error::Unavailable("the server is shutting down".into()));
         }
         if let Readiness::Failed(_) = self.readiness() {
-            return Err(Error::Unavailable("the device cannot be used; the server's log says why".into()));
+            return Err(Error::Unavailable(NO_DEVICE.into()));
         }
         let limit = self.inner.limits.queue;
         let took =
@@ -175,7 +190,7 @@ impl Engine {
     }
 
     fn run(&self, job: &Arc<Job>) {
-        if self.inner.commands.send(job.clone()).is_err() {
+        if self.inner.commands.send(Command::Run(job.clone())).is_err() {
             job.fail(&Error::internal("the device thread ended"));
         }
     }
@@ -277,54 +292,5 @@ impl Engine {
     /// Whether the engine is draining.
     pub fn is_draining(&self) -> bool {
         self.inner.draining.load(Ordering::Acquire)
-    }
-}
-
-/// The device thread: opens the device, warms it, then goes round the live jobs, a slice each, until every handle is gone.
-fn device_thread(
-    config: &DeviceConfig,
-    incoming: &Receiver<Arc<Job>>,
-    readiness: &watch::Sender<Readiness>,
-    most_live: usize,
-) {
-    let mut context = match Device::open(config).and_then(DeviceContext::warm) {
-        Ok(context) => context,
-        Err(error) => {
-            tracing::error!(%error, "the device is not usable");
-            readiness.send_replace(Readiness::Failed(error.to_string()));
-            // Whoever got in before must not wait for ever.
-            while let Ok(job) = incoming.recv() {
-                job.fail(&error);
-            }
-            return;
-        }
-    };
-    readiness.send_replace(Readiness::Ready(Arc::new(context.device.info().clone())));
-    let mut waiting: VecDeque<Arc<Job>> = VecDeque::new();
-    let mut live: VecDeque<Live> = VecDeque::new();
-    loop {
-        if live.is_empty() && waiting.is_empty() {
-            context.tidy();
-            match incoming.recv() {
-                Ok(job) => waiting.push_back(job),
-                Err(_) => return,
-            }
-        }
-        waiting.extend(incoming.try_iter());
-        waiting.retain(|job| !job.state().is_terminal());
-        while live.len() < most_live {
-            let Some(job) = waiting.pop_front() else { break };
-            live.push_back(Live::new(job));
-        }
-        metrics::gauge!("cloudchamber_renders_live").set(live.len() as f64);
-        metrics::gauge!("cloudchamber_renders_waiting").set(waiting.len() as f64);
-        let Some(mut current) = live.pop_front() else { continue };
-        // A panic in one job is that job's failure and nobody else's.
-        match catch_unwind(AssertUnwindSafe(|| current.turn(&mut context))) {
-            Ok(Ok(Turn::Again)) => live.push_back(current),
-            Ok(Ok(Turn::Over)) => {}
-            Ok(Err(error)) => current.fail(error),
-            Err(_) => current.fail(Error::internal("a panic on the device thread")),
-        }
     }
 }

@@ -5,12 +5,12 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::context::{DeviceContext, warm};
+use super::context::DeviceContext;
 use super::pace::Pace;
 use crate::device::{Buffer, DeviceInfo};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::technique::photon_transport::FieldPass;
-use crate::technique::{self, Field, FieldPlan};
+use crate::technique::{Field, FieldPlan};
 use crate::volume::Volume;
 
 /// Batches of equal size: enough for the standard errors of the ledger, and a power of two for the doublings.
@@ -51,11 +51,8 @@ pub(super) struct FieldRun {
 }
 
 impl FieldRun {
-    pub fn new(context: &mut DeviceContext, field: &Arc<dyn Field>) -> Result<Self> {
-        let plan = field.plan()?;
-        let technique = technique::find(plan.variant.kernel);
-        let source = technique.ok_or_else(|| Error::internal("a field whose kernel is no technique's"))?.source;
-        warm(&mut context.device, &source(), &plan.variant)?;
+    /// Begins what `plan` says, whose kernel is built.
+    pub fn new(context: &mut DeviceContext, field: &Arc<dyn Field>, plan: FieldPlan) -> Result<Self> {
         let device = &context.device;
         let table = device.upload(bytemuck::cast_slice(&plan.table), 8)?;
         let parameters = device.upload(&plan.parameters, 0)?;

@@ -13,6 +13,8 @@ use super::report::warnings;
 use super::verdict::{Verdict, verdict};
 use super::view_run::{Pass, ViewRun};
 use super::{Job, Snapshot};
+use crate::device::cells;
+use crate::device::program::Variant;
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::film::picture::Background;
@@ -30,13 +32,22 @@ const FRAME_EVERY: Duration = Duration::from_millis(30);
 pub(super) enum Turn {
     /// More to do.
     Again,
+    /// Nothing before a kernel is compiled.
+    Waits,
     /// The device is through with the job.
     Over,
+}
+
+/// What cannot begin before its kernel is compiled.
+enum Awaited {
+    Field,
+    View(Arc<Volume>),
 }
 
 /// A job with its buffers.
 pub(super) struct Live {
     job: Arc<Job>,
+    awaited: Option<Awaited>,
     generation: u64,
     asked: Instant,
     started: Instant,
@@ -63,6 +74,7 @@ impl Live {
         let now = Instant::now();
         Self {
             job,
+            awaited: None,
             generation: 0,
             asked: now,
             started: now,
@@ -90,7 +102,14 @@ impl Live {
         if self.job.is_cancelled() || self.job.state().is_terminal() {
             return Ok(Turn::Over);
         }
-        self.follow_camera(context)?;
+        match self.awaited.take() {
+            None => self.follow_camera(context)?,
+            Some(Awaited::Field) => self.begin_field(context)?,
+            Some(Awaited::View(volume)) => self.begin_view(context, volume)?,
+        }
+        if self.awaited.is_some() {
+            return Ok(Turn::Waits);
+        }
         if !self.look && self.field.as_ref().is_some_and(|f| !f.is_done()) {
             return self.field_turn(context);
         }
@@ -115,7 +134,6 @@ impl Live {
         self.half = None;
         self.earlier_time = Duration::ZERO;
         self.learn_motion();
-        self.job.started();
         let complete = self.job.lock().complete_field.clone();
         self.aim(context, complete)?;
         match (&mut self.view, &self.scene, &self.volume) {
@@ -142,6 +160,7 @@ impl Live {
             (_, Some(volume), Some(view)) => {
                 // A field that is still filling is looked at from the new camera at once.
                 self.look = self.field.as_ref().is_some_and(|f| !f.is_done());
+                self.job.started();
                 view.restart(context, scene, volume)
             }
             // A field that was computed for an earlier camera is looked at again, not computed again.
@@ -150,18 +169,47 @@ impl Live {
                 None => Ok(()),
             },
             (Subject::Volume(volume), _, _) => self.begin_view(context, volume.clone()),
-            (Subject::Field(field), _, _) => {
-                let run = FieldRun::new(context, field)?;
-                self.job.lock().reasons = run.reasons().to_vec();
-                self.field = Some(run);
-                Ok(())
+            (Subject::Field(_), _, _) => self.begin_field(context),
+        }
+    }
+
+    /// Whether kernels are ready; one that is not is waited for.
+    fn is_ready(&self, context: &mut DeviceContext, variants: &[Variant]) -> Result<bool> {
+        let mut all = true;
+        for variant in variants {
+            if !context.is_ready(variant)? {
+                self.job.waits_for(variant);
+                all = false;
             }
         }
+        if all {
+            self.job.started();
+        }
+        Ok(all)
+    }
+
+    fn begin_field(&mut self, context: &mut DeviceContext) -> Result<()> {
+        let Some(Subject::Field(field)) = self.scene.as_ref().map(Scene::subject) else { return Ok(()) };
+        let plan = field.plan()?;
+        if !self.is_ready(context, &[plan.variant])? {
+            self.awaited = Some(Awaited::Field);
+            return Ok(());
+        }
+        let run = FieldRun::new(context, field, plan)?;
+        self.job.lock().reasons = run.reasons().to_vec();
+        self.field = Some(run);
+        Ok(())
     }
 
     fn begin_view(&mut self, context: &mut DeviceContext, volume: Arc<Volume>) -> Result<()> {
         let Some(scene) = &self.scene else { return Ok(()) };
-        let view = ViewRun::new(context, scene, &volume)?;
+        let plan = scene.view().plan(&volume)?;
+        let [of_cells, of_distances] = cells::needed(volume.voxel_type());
+        if !self.is_ready(context, &[plan.variant, of_cells, of_distances])? {
+            self.awaited = Some(Awaited::View(volume));
+            return Ok(());
+        }
+        let view = ViewRun::new(context, scene, &volume, plan)?;
         {
             let mut progress = self.job.lock();
             progress.reasons = self.field.as_ref().map_or(Vec::new(), |f| f.reasons().to_vec());

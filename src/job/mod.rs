@@ -4,11 +4,14 @@
 //! the async runtime develops the newest of them into a frame (`develop.rs`); readers watch the latest frame and never hold
 //! anybody up.
 
+mod compile;
 mod context;
 mod develop;
+mod device_thread;
 mod distances;
 mod engine;
 mod field_run;
+mod kernels;
 mod layer;
 mod live;
 mod motion;
@@ -20,6 +23,7 @@ mod rounds;
 mod tiling;
 mod verdict;
 mod view_run;
+mod warm;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -28,13 +32,16 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 use serde_json::Value;
 use tokio::sync::watch;
 
+use crate::device::program::Variant;
 use crate::error::{Error, Result};
 use crate::film::{ErrorEstimate, Film};
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 
+pub use compile::compile_kernels;
 pub use engine::{Engine, Place, Readiness};
 pub use field_run::PICTURES_ON_THE_WAY;
+pub use kernels::KernelProgress;
 pub use report::{Counts, Frame, State, Timings, TracePoint, Update};
 
 /// Points of the convergence trace that are kept; past this, every second one is dropped.
@@ -106,7 +113,9 @@ pub(crate) struct Progress {
     pub samples: u32,
     pub error: Option<ErrorEstimate>,
     pub stopped_by: Option<&'static str>,
-    pub failure: Option<String>,
+    pub failure: Option<Error>,
+    /// The kernel that it waits for, while that is compiled.
+    pub waits_for: Option<String>,
     pub result: Option<Value>,
     pub film: Option<Arc<Film>>,
     pub field: Option<Arc<crate::volume::Volume>>,
@@ -150,6 +159,7 @@ impl Job {
             error: None,
             stopped_by: None,
             failure: None,
+            waits_for: None,
             result: None,
             film: None,
             field: None,
@@ -229,17 +239,23 @@ impl Job {
 
     pub(crate) fn fail(&self, error: &Error) -> bool {
         // An internal error's text is for the log; a client learns that it happened.
-        let words = match error {
-            Error::Internal(cause) => {
-                tracing::error!(render = %self.id, %cause, "render failed");
-                "the render failed on the server".to_owned()
-            }
-            other => other.to_string(),
-        };
-        self.end(State::Failed, Some(words))
+        if let Error::Internal(cause) = error {
+            tracing::error!(render = %self.id, %cause, "render failed");
+        }
+        self.end(State::Failed, Some(error.clone()))
     }
 
-    fn end(&self, state: State, failure: Option<String>) -> bool {
+    /// What it failed by.
+    pub fn failure(&self) -> Option<Error> {
+        self.lock().failure.clone()
+    }
+
+    /// Notes which kernel it waits for.
+    pub(crate) fn waits_for(&self, variant: &Variant) {
+        self.lock().waits_for = Some(variant.label());
+    }
+
+    fn end(&self, state: State, failure: Option<Error>) -> bool {
         let mut progress = self.lock();
         if progress.state.is_terminal() {
             return false;
@@ -254,6 +270,7 @@ impl Job {
     /// Sets the state to running; the first time notes how long the job waited.
     pub(crate) fn started(&self) {
         let mut progress = self.lock();
+        progress.waits_for = None;
         if progress.state == State::Queued {
             progress.state = State::Running;
             progress.timings.queued_ms = Some(progress.asked.elapsed().as_secs_f64() * 1e3);

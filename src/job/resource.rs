@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use super::Job;
+use crate::error::Error;
 
 impl Job {
     /// A line of `GET /v1/renders`.
@@ -31,7 +32,11 @@ impl Job {
             "error": p.error.map(|e| e.total),
             "error_parts": p.error,
             "stopped_by": p.stopped_by,
-            "failure": p.failure,
+            "failure": p.failure.as_ref().map(|error| match error {
+                Error::Internal(_) => "the render failed on the server".to_owned(),
+                other => other.to_string(),
+            }),
+            "waits_for": p.waits_for.as_ref().map(|kernel| json!({"kernel": kernel})),
             "timings": p.timings,
             "counts": p.counts,
             "warnings": p.warnings,

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::SampleCounts;
-use super::context::{DeviceContext, DeviceVolume, warm};
+use super::context::{DeviceContext, DeviceVolume};
 use super::distances::distances;
 use super::layer::Layer;
 use super::motion::{Motion, Moving};
@@ -73,9 +73,8 @@ pub(super) struct ViewRun {
 }
 
 impl ViewRun {
-    pub fn new(context: &mut DeviceContext, scene: &Scene, volume: &Arc<Volume>) -> Result<Self> {
-        let mut plan = scene.view().plan(volume)?;
-        warm(&mut context.device, &(scene.technique().source)(), &plan.variant)?;
+    /// Begins what `plan` says, whose kernel is built.
+    pub fn new(context: &mut DeviceContext, scene: &Scene, volume: &Arc<Volume>, mut plan: ViewPlan) -> Result<Self> {
         let on_device = context.volume(volume)?;
         let distances = distances(context, &on_device, volume, &mut plan)?;
         let region = scene.region();

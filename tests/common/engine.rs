@@ -36,7 +36,7 @@ impl House {
         let limits = Flags::parse_from(["test"]).limits;
         let store = Store::open(&data.path().join("volumes"), limits.store()).unwrap();
         let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().unwrap();
-        let config = DeviceConfig { wish: "pocl".into(), lanes, kernels: None, images: None };
+        let config = DeviceConfig { lanes, ..DeviceConfig::pocl() };
         let engine = runtime.block_on(async { Engine::start(config, limits.clone()) }).unwrap();
         runtime.block_on(engine.ready()).unwrap();
         Self { engine, store, limits, runtime, _data: data }

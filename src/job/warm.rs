@@ -1,0 +1,62 @@
+//! Building a kernel for real: PoCL compiles at the first launch, so each is launched once on nothing.
+
+use std::path::PathBuf;
+
+use super::compile::Compiler;
+use super::kernels;
+use crate::device::program::Variant;
+use crate::device::{Buffer, Device};
+use crate::error::{Error, Result};
+use crate::volume::Voxels;
+
+/// Builds a variant and launches it once on nothing.
+///
+/// # Errors
+/// [`Error::Internal`] with the build log.
+pub(super) fn warm(device: &mut Device, variant: &Variant) -> Result<()> {
+    if device.is_built(variant) {
+        return Ok(());
+    }
+    let source = kernels::source_of(variant)?;
+    device.build(&source, variant)?;
+    // Zeroed buffers ask for an image of no pixels or a launch of no histories: compiled, and nothing done.
+    let mut zero: Vec<Buffer> = (0..source.arguments).map(|_| device.upload(&[0; 1024], 0)).collect::<Result<_>>()?;
+    if let (Some(volume), true) = (source.volume, device.info().volumes_are_images) {
+        zero[volume] = device.upload_image(&Voxels::U8(vec![0]), [1; 3])?;
+    }
+    device.run(variant, &zero.iter().collect::<Vec<_>>(), 1)?;
+    // A note beside what PoCL keeps; without it the variant is compiled again, which finds it there.
+    if let Some(note) = note(device, variant) {
+        drop(note.parent().map(std::fs::create_dir_all));
+        drop(std::fs::write(note, variant.label()));
+    }
+    Ok(())
+}
+
+/// Where it is noted that PoCL's cache has a variant: in the cache's own folder, so that both go together.
+fn note(device: &Device, variant: &Variant) -> Option<PathBuf> {
+    let cache = std::env::var_os("POCL_CACHE_DIR").filter(|_| device.info().is_pocl())?;
+    let source = kernels::source_of(variant).ok()?;
+    Some(PathBuf::from(cache).join("cloudchamber").join(device.fingerprint(&source, variant).ok()?))
+}
+
+/// Whether PoCL's cache has a variant.
+pub(super) fn is_cached(device: &Device, variant: &Variant) -> bool {
+    note(device, variant).is_some_and(|note| note.exists())
+}
+
+/// Builds what the first picture needs. Where there is a compiler its process goes first: what LLVM cannot compile ends that one.
+///
+/// # Errors
+/// [`Error::Internal`] with the compiler's words.
+pub(super) fn first_kernels(device: &mut Device, compiler: Option<&Compiler>) -> Result<()> {
+    let mut process = None;
+    for variant in kernels::first() {
+        if let Some(compiler) = compiler.filter(|_| device.info().is_pocl() && !is_cached(device, &variant)) {
+            let compiled = compiler.compile(&mut process, &variant);
+            compiled.map_err(|words| Error::internal(format!("{}: {words}", variant.label())))?;
+        }
+        warm(device, &variant)?;
+    }
+    Ok(())
+}
