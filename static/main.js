@@ -194,10 +194,17 @@ new ResizeObserver(() => {
 window.addEventListener('pagehide', () => session.leave());
 window.addEventListener('pageshow', (event) => { if (event.persisted) replaceSoon(); });
 
+/** The device in the header: its level and lanes, what it gave up, and how far its kernels are until all are compiled. */
 async function showDevice() {
-  const device = await json('v1/device');
-  const name = device.name ?? device.device?.name ?? device.device ?? '';
-  byId('device').textContent = typeof name === 'string' ? name : '';
+  const { device, level, lanes, gave_up: gaveUp = [], kernels } = await json('v1/device');
+  const { built, of, failed } = kernels;
+  const compiling = built + failed.length < of;
+  byId('device').textContent = [device, `${level}, ${lanes} ${lanes === 1 ? 'lane' : 'lanes'}`,
+    ...(compiling ? [`kernels ${built} of ${of}`] : []),
+    ...(failed.length > 0 ? [`${failed.length} not available`] : [])].join(' · ');
+  byId('device').title = ['The OpenCL device that renders', ...gaveUp.map((what) => `Given up: ${what}`),
+    ...failed.map((kernel) => `Does not build: ${kernel}`)].join('\n');
+  if (compiling) setTimeout(() => showDevice().catch(() => {}), 1000);
 }
 
 async function start() {

@@ -85,9 +85,11 @@ impl App {
 
 /// Measures the device for the planner; a plan that comes meanwhile waits for it.
 async fn calibrate(app: App) {
-    if app.engine.ready().await.is_ok()
-        && let Err(error) = plans::planner(&app).calibrate().await
-    {
+    if app.engine.ready().await.is_err() {
+        return;
+    }
+    app.engine.compiled().await;
+    if let Err(error) = plans::planner(&app).calibrate().await {
         tracing::warn!(%error, "the device is not calibrated");
     }
 }

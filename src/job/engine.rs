@@ -112,6 +112,13 @@ impl Engine {
         self.inner.kernels.progress()
     }
 
+    /// Waits until nothing is left to compile: before that, times are not those of the device alone.
+    pub async fn compiled(&self) {
+        while !self.inner.kernels.are_all_known() {
+            tokio::time::sleep(Duration::from_millis(100)).await;
+        }
+    }
+
     /// Waits until the device is ready.
     ///
     /// # Errors

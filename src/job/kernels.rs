@@ -75,10 +75,12 @@ pub(super) fn source_of(variant: &Variant) -> Result<Source> {
     sources().find(|s| s.kernel == variant.kernel).ok_or_else(missing)
 }
 
-/// What the first picture needs, most likely: a volume of bytes by the first technique.
+/// What the first picture needs, most likely: the first technique on floats, as built-in volumes have, and on bytes.
 pub(super) fn first() -> Vec<Variant> {
-    let view = technique::ALL.first().and_then(|t| ((t.source)().variants)().first().copied());
-    view.into_iter().chain(cells::needed(VoxelType::U8)).collect()
+    let views = technique::ALL.first().map_or(Vec::new(), |t| ((t.source)().variants)());
+    let of =
+        |voxel| views.iter().find(move |v| v.voxel == Some(voxel)).copied().into_iter().chain(cells::needed(voxel));
+    of(VoxelType::F32).chain(of(VoxelType::U8)).collect()
 }
 
 /// What is compiled ahead, the likeliest first.
@@ -183,6 +185,11 @@ impl Kernels {
         let mut failed: Vec<String> = with(Status::Failed).map(|(v, _)| v.label()).collect();
         failed.sort();
         KernelProgress { built: with(Status::Compiled).count(), of: state.status.len(), failed }
+    }
+
+    /// Whether nothing is left to compile.
+    pub fn are_all_known(&self) -> bool {
+        self.lock().status.values().all(|s| matches!(s, Status::Compiled | Status::Failed))
     }
 
     /// Ends the processes.
