@@ -12,6 +12,7 @@ pub mod cases;
 pub mod draw;
 pub mod experiments;
 pub mod fit;
+#[cfg(feature = "flip")]
 pub mod flip;
 pub mod measure;
 pub mod oracle;

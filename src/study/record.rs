@@ -85,7 +85,7 @@ pub struct Point {
     /// What it is wrong by.
     #[serde(flatten)]
     pub error: Measured,
-    /// How different its picture looks, where it is one.
+    /// How different its picture looks, where it is one and the program has the feature `flip`.
     pub flip: Option<f64>,
     /// What its reply says its error is.
     pub stated_error: Option<f64>,

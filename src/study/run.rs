@@ -6,7 +6,9 @@ use serde_json::json;
 
 use super::bench::{Bench, Reads, Run};
 use super::record::{Choice, Line, Machine, Point, Record};
-use super::{Case, Scale, Setting, Trial, Truth, fit, flip, measure};
+#[cfg(feature = "flip")]
+use super::flip;
+use super::{Case, Scale, Setting, Trial, Truth, fit, measure};
 use crate::chart::plain;
 use crate::error::Result;
 use crate::power_law::PowerLaw;
@@ -132,7 +134,10 @@ fn point(bench: &Bench, setting: &Setting, truth: &Truth, scale: Scale) -> Resul
         device_ms: of(|r| r.device_ms),
         wall_ms: of(|r| r.wall_ms),
         error,
+        #[cfg(feature = "flip")]
         flip: size.map(|size| flip::mean_flip(expected, &values[0], size)).transpose()?,
+        #[cfg(not(feature = "flip"))]
+        flip: size.and(None),
         stated_error: runs[0].stated_error,
         samples: runs[0].samples,
         runs: if setting.random { runs.len() } else { 1 },
