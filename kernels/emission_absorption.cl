@@ -117,11 +117,12 @@ static inline void preintegrated_step(constant const View *view, constant const 
 #elif !SHADED
 #define IN_STRIDES 1
 #define STRIDES_END inner_end
-#elif defined(NARROW)
+#elif defined(NARROW) && NARROW_GRADIENTS
 #define IN_STRIDES 1
 #define STRIDES_END narrow_end
 #else
-#define IN_STRIDES 0
+#define IN_STRIDES 1
+#define STRIDES_END inner_end
 #endif
 
 #if IN_STRIDES
@@ -130,17 +131,23 @@ static inline void preintegrated_step(constant const View *view, constant const 
 static inline void see(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels, global const uchar *table,
                        const Packet *p, int k, int end, Span span, int form, const Real *place, Radiance *r) {
 #if SHADED
+#if NARROW_GRADIENTS
     BlockPlaces places = block_places(view, p->low + p->low_pace * (float)k, p->low_pace);
     Fixed3 at = fixed3(along(p->start, p->pace, (Real)((float)k))), pace = fixed3_nearest(p->pace);
+#endif
     Real3 colour[STRIDE], gradient[STRIDE];
     Real weight[STRIDE];
     int lit = 0;
-    for (int i = 0; i < end - k; i++, at = add_fixed3(at, pace)) {
+    for (int i = 0; i < end - k; i++) {
         Optical o = optical_at(table, span, form, place[i]);
         weight[lit] = weight_of(params, o.alpha, r);
         if (!any_lane(MASK(weight[lit] > 0.0f))) continue;
         colour[lit] = o.colour;
-        gradient[lit++] = narrow_gradient(view, voxels, &places, i, inner_of(at));
+#if NARROW_GRADIENTS
+        gradient[lit++] = narrow_gradient(view, voxels, &places, i, inner_of(way_fixed3(at, pace, i)));
+#else
+        inner_gradient(view, voxels, along(p->start, p->pace, (Real)((float)(k + i))), &gradient[lit++]);
+#endif
     }
     for (int i = 0; i < lit; i++) add_light(shade(view, gradient[i], GRADIENT_UNIT, p->half_way, colour[i]), weight[i], r);
 #else

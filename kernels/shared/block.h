@@ -1,8 +1,14 @@
-// Samples of 16 lanes that are within NARROW voxels of each other: the 4 x 4 x 4 voxels that they read come by a load a row, all
+// Samples of 16 or 8 lanes that are within NARROW voxels of each other: the 4 x 4 x 4 voxels that they read come by a load a row, all
 // lanes together, and are read by permutations. What a lane would gather for itself costs two to four times as much.
-#if defined(INNER_BYTES) && LANES == 16 && defined(__AVX512BW__) && __has_builtin(__builtin_ia32_pmaddwd512)
+#if INTERPOLATION == TRILINEAR && !VOLUMES_ARE_IMAGES
+#if WEIGHTS_ARE_WORDS && (VOXEL == VOXEL_U8 || LANES == 16)
 #define NARROW 1.98f
+#elif VOXEL == VOXEL_F32 && LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_vpermi2varps512)
+#define NARROW 1.98f
+#endif
+#endif
 
+#ifdef NARROW
 // One load wherever it lies; of vload4's four bytes the compiler makes several.
 typedef struct __attribute__((packed)) { int word; } UnalignedInt;
 typedef struct __attribute__((packed)) { long word; } UnalignedLong;
@@ -13,7 +19,9 @@ static inline int4 load_rows(global const uchar *from, int row) {
     return (int4)(INT_AT(from), INT_AT(from + row), INT_AT(from + 2 * row), INT_AT(from + 3 * row));
 }
 
-#if SHADED
+// Gradients come from the block, too, where a register holds all of it.
+#define NARROW_GRADIENTS (SHADED && LANES == 16 && VOXEL == VOXEL_U8)
+#if NARROW_GRADIENTS
 // Voxels that are read before and after the block, and the fewest a side that this leaves room for.
 #define AROUND 1
 #define NARROW_LEAST 6
@@ -40,45 +48,105 @@ static inline BlockPlaces block_places(constant const View *view, float4 low, fl
     return c;
 }
 
-// The block of voxels for a step.
+// The block of voxels for a step, and where it is.
+#if VOXEL == VOXEL_U8 && LANES == 16
 typedef struct { Int voxels, rows, bytes; } Block;
+#define BLOCK_ROW(b, at) __builtin_ia32_permvarsi512((b)->voxels, at)
+#elif VOXEL == VOXEL_U8
+typedef struct { Int low, high, rows, bytes; } Block;
+// Bit 3 of a row's number says in which of them it is.
+#define BLOCK_ROW(b, at) select(__builtin_ia32_permvarsi256((b)->low, at), __builtin_ia32_permvarsi256((b)->high, at), (at) << 28)
+#elif VOXEL == VOXEL_F32
+typedef struct { Real sheet[4]; int first; } Block;
+#else
+typedef struct { Words low, high; int first; } Block;
+#endif
 
-static inline Block block_from(constant const View *view, global const uchar *from, int rows, int bytes) {
-    int row = view->dims[0], sheet = view->dims[0] * view->dims[1];
+static inline long4 load_wide_rows(global const uchar *from, int row) {
+    return (long4)(LONG_AT(from), LONG_AT(from + row), LONG_AT(from + 2 * row), LONG_AT(from + 3 * row));
+}
+
+// From the address of its lowest corner, and what leads to its rows, bytes and words.
+static inline Block block_from(constant const View *view, global const uchar *from, int rows, int bytes, int words) {
+    int row = view->dims[0] * VOXEL_BYTES, sheet = view->dims[1] * row;
     Block b;
+#if VOXEL == VOXEL_U8 && LANES == 16
     b.voxels = (Int)(load_rows(from, row), load_rows(from + sheet, row), load_rows(from + 2 * sheet, row), load_rows(from + 3 * sheet, row));
     b.rows = (Int)(rows), b.bytes = (Int)(bytes);
+#elif VOXEL == VOXEL_U8
+    b.low = (Int)(load_rows(from, row), load_rows(from + sheet, row));
+    b.high = (Int)(load_rows(from + 2 * sheet, row), load_rows(from + 3 * sheet, row));
+    b.rows = (Int)(rows), b.bytes = (Int)(bytes);
+#elif VOXEL == VOXEL_F32
+    for (int z = 0; z < 4; z++) {
+        #define ROW(y) vload4(0, (global const float *)(from + z * sheet + (y) * row))
+        b.sheet[z] = (Real)(ROW(0), ROW(1), ROW(2), ROW(3));
+        #undef ROW
+    }
+    b.first = words;
+#else
+    b.low = AS_WORDS((long8)(load_wide_rows(from, row), load_wide_rows(from + sheet, row)));
+    b.high = AS_WORDS((long8)(load_wide_rows(from + 2 * sheet, row), load_wide_rows(from + 3 * sheet, row)));
+    b.first = words;
+#endif
     return b;
 }
 
 static inline Block block_at(constant const View *view, VOLUME voxels, const BlockPlaces *c, int i) {
-    return block_from(view, voxels + c->offset[i], c->rows[i], c->bytes[i]);
+    return block_from(view, voxels + (size_t)c->offset[i] * VOXEL_BYTES, c->rows[i], c->bytes[i], c->words[i]);
 }
 
+#if VOXEL == VOXEL_F32
+// One of the block's 64 voxels a lane.
+static inline Real block_voxel(const Block *b, Int at) {
+    Real low = __builtin_ia32_vpermi2varps512(b->sheet[0], at, b->sheet[1]), high = __builtin_ia32_vpermi2varps512(b->sheet[2], at, b->sheet[3]);
+    return select(low, high, at << 26);
+}
+
+// The same arithmetic as inner_raw's.
+static inline Real block_raw(const Block *b, Real3 p) {
+    Int ix = to_int(p.x), iy = to_int(p.y), iz = to_int(p.z), at = (iz << 4) + (iy << 2) + ix + b->first;
+    Real fx = p.x - to_real(ix), fy = p.y - to_real(iy), fz = p.z - to_real(iz);
+    #define LINE(n) ({ Real a = block_voxel(b, at + (n)); mad(block_voxel(b, at + (n) + 1) - a, fx, a); })
+    Real near = LINE(0), low = LINE(4), far = LINE(16), deep = LINE(20);
+    #undef LINE
+    Real front = mad(low - near, fy, near), back = mad(deep - far, fy, far);
+    return mad(back - front, fz, front);
+}
+#elif VOXEL == VOXEL_U8
 static inline Real block_raw(const Block *block, Inner i) {
     Int at = (i.z << 2) + i.y + block->rows;
     Int order = __builtin_astype(BOTH_HIGH(i.at.x), Int) + (PAIR_ORDER + block->bytes);
-    #define PAIR(n, weights) MULTIPLY_ADD(SHUFFLE(__builtin_ia32_permvarsi512(block->voxels, at + (n)), order), weights)
+    #define PAIR(n, weights) MULTIPLY_ADD(SHUFFLE(BLOCK_ROW(block, at + (n)), order), weights)
     return to_real((PAIR(0, i.near) + PAIR(1, i.next)) + (PAIR(4, i.far) + PAIR(5, i.beyond)));
     #undef PAIR
 }
+#else
+static inline Real block_raw(const Block *block, Inner i) {
+    Int word = (i.z << 4) + (i.y << 2) + i.x + block->first, pair = (word | (word << 16)) + 0x10000;
+    #define PAIR(n, weights) MULTIPLY_ADD(__builtin_ia32_vpermi2varhi512(block->low, AS_WORDS(pair + (n) * 0x10001), block->high) ^ AS_WORDS((Int)(WORD_SIGNS)), weights)
+    return WHOLE((PAIR(0, i.near) + PAIR(4, i.next)) + (PAIR(16, i.far) + PAIR(20, i.beyond)));
+    #undef PAIR
+}
+#endif
 
 // The same of a single step, whose least place is `low`.
 static inline Real narrow_raw(constant const View *view, VOLUME voxels, Real3 p, float4 low) {
     int4 first = min(convert_int4(low), (int4)(view->dims[0], view->dims[1], view->dims[2], 4) - 4);
     size_t offset = ((size_t)first.z * view->dims[1] + first.y) * view->dims[0] + first.x;
-    Block block = block_from(view, voxels + offset, -(first.z * 4 + first.y), first.x * -0x10001);
+    int rows = -(first.z * 4 + first.y), words = 4 * rows - first.x;
+    Block block = block_from(view, voxels + offset * VOXEL_BYTES, rows, first.x * -0x10001, words);
+#if INNER_WHOLE
     return block_raw(&block, inner_at(p));
+#else
+    return block_raw(&block, p);
+#endif
 }
 
-#if SHADED
+#if NARROW_GRADIENTS
 // For gradients the block with what is around it: its rows from a voxel before to three after, two registers of eight, and four rows
 // each beside it: before and after in y for each z, before and after in z for each y.
 typedef struct { long8 low, high; Int beside; } WideBlock;
-
-static inline long4 load_wide_rows(global const uchar *from, int row) {
-    return (long4)(LONG_AT(from), LONG_AT(from + row), LONG_AT(from + 2 * row), LONG_AT(from + 3 * row));
-}
 
 static inline WideBlock wide_block_at(constant const View *view, global const uchar *from) {
     int row = view->dims[0], sheet = view->dims[0] * view->dims[1];

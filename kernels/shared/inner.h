@@ -1,46 +1,73 @@
 // Samples of packets whose lanes are all at least INNER_MARGIN voxels away from the box's faces: no clamps. A place is
-// given by inner_place, and values are in units of INNER_UNIT. Bytes are weighed in whole numbers, with weights of 15 bits that add
-// up to all of it: exact to some 2^-15 of their differences, and the same to the last bit for any number of lanes.
+// given by inner_place, and values are in units of INNER_UNIT. Bytes and words are weighed in whole numbers, with weights of 15 bits that
+// add up to all of it: exact to some 2^-15 of their differences, and the same to the last bit for any number of lanes.
 #define INNER_MARGIN 1.51f
 // A gradient by central differences comes in units of this a voxel.
 #define GRADIENT_UNIT (0.5f * INNER_UNIT)
 
-#if INTERPOLATION == TRILINEAR && VOXEL == VOXEL_U8 && !VOLUMES_ARE_IMAGES
-#define INNER_BYTES 1
+#if INTERPOLATION == TRILINEAR && VOXEL != VOXEL_F32 && !VOLUMES_ARE_IMAGES
+#define INNER_WHOLE 1
 #define INNER_UNIT (1.0f / 32767.0f)
 // A place comes with 16 binary places.
 #define INNER_PLACES 65536.0f
 // What is cut off of a place, and of half of its product with a weight, is half of its last binary place on the average.
 #define INNER_ROUNDING 1.0f
 
+#if VOXEL == VOXEL_U16
+// Words without a sign are weighed with one, half of their range below; WHOLE puts it back.
+#define WORD_SIGNS ((int)0x80008000)
+#define WHOLE(sum) to_real((sum) + 0x8000 * 0x7fff)
+#else
+#define WORD_SIGNS 0
+#define WHOLE(sum) to_real(sum)
+#endif
+
+// Weights as words, two of them multiplied and added by one instruction: a register of lanes at AVX-512 and at AVX2.
 #if LANES == 16 && defined(__AVX512BW__) && __has_builtin(__builtin_ia32_pmaddwd512)
-typedef short Words __attribute__((ext_vector_type(32)));
-typedef char Bytes __attribute__((ext_vector_type(64)));
+#define WEIGHTS_ARE_WORDS 1
+#define LEVEL_BUILTIN(name) JOIN(__builtin_ia32_##name, 512)
+#define REPEATED(a, b, c, d) ((Int)(a, b, c, d, a, b, c, d, a, b, c, d, a, b, c, d))
+#elif LANES == 8 && defined(__AVX2__) && __has_builtin(__builtin_ia32_pmaddwd256)
+#define WEIGHTS_ARE_WORDS 1
+#define LEVEL_BUILTIN(name) JOIN(__builtin_ia32_##name, 256)
+#define REPEATED(a, b, c, d) ((Int)(a, b, c, d, a, b, c, d))
+#endif
+
+#if WEIGHTS_ARE_WORDS
+typedef short Words __attribute__((ext_vector_type(2 * LANES)));
+typedef char Bytes __attribute__((ext_vector_type(4 * LANES)));
 typedef Words Weights; // those of two voxels side by side in x
 #define AS_WORDS(v) __builtin_astype(v, Words)
-#define FOUR(a, b, c, d) ((Int)(a, b, c, d, a, b, c, d, a, b, c, d, a, b, c, d))
-#define SHUFFLE(v, order) __builtin_astype(__builtin_ia32_pshufb512(__builtin_astype(v, Bytes), __builtin_astype(order, Bytes)), Words)
-#define MULTIPLY_ADD(a, b) __builtin_astype(__builtin_ia32_pmaddwd512(a, b), Int)
+#define SHUFFLE(v, order) __builtin_astype(LEVEL_BUILTIN(pshufb)(__builtin_astype(v, Bytes), __builtin_astype(order, Bytes)), Words)
+#define MULTIPLY_ADD(a, b) __builtin_astype(LEVEL_BUILTIN(pmaddwd)(a, b), Int)
 // The bytes 0 and 1 of each lane as two words.
-#define PAIR_ORDER FOUR(0x80018000, 0x80058004, 0x80098008, 0x800d800c)
+#define PAIR_ORDER REPEATED(0x80018000, 0x80058004, 0x80098008, 0x800d800c)
 // The low word of each lane in both, and the high one.
-#define BOTH(v) SHUFFLE(v, FOUR(0x01000100, 0x05040504, 0x09080908, 0x0d0c0d0c))
-#define BOTH_HIGH(v) SHUFFLE(v, FOUR(0x03020302, 0x07060706, 0x0b0a0b0a, 0x0f0e0f0e))
+#define BOTH(v) SHUFFLE(v, REPEATED(0x01000100, 0x05040504, 0x09080908, 0x0d0c0d0c))
+#define BOTH_HIGH(v) SHUFFLE(v, REPEATED(0x03020302, 0x07060706, 0x0b0a0b0a, 0x0f0e0f0e))
 
 // Those at the fraction of x.
 static inline Weights weights_at(Int x) {
-    // (1 - f, f) as words: (f & 0x7fff7fff) ^ 0x7fff in one instruction
+    // (1 - f, f) as words
     Int f = __builtin_astype(BOTH(x >> 1), Int);
+#if LANES == 16
     return AS_WORDS(__builtin_ia32_pternlogd512_mask(f, (Int)(0x7fff7fff), (Int)(0x7fff), 0x6a, (short)-1));
+#else
+    return AS_WORDS((f & 0x7fff7fff) ^ 0x7fff);
+#endif
 }
 
 // The part of them that the fraction of `place` gives to the farther of two.
-static inline Weights farther(Weights w, Int place) { return __builtin_ia32_pmulhuw512(w, BOTH(place)); }
+static inline Weights farther(Weights w, Int place) { return LEVEL_BUILTIN(pmulhuw)(w, BOTH(place)); }
 
 static inline Weights less(Weights w, Weights part) { return w - part; }
 
+#if VOXEL == VOXEL_U8
 // The bytes n and n + 1 of each lane's word, weighed.
 static inline Int weigh(Int word, int n, Weights w) { return MULTIPLY_ADD(SHUFFLE(word, PAIR_ORDER + n * 0x10001), w); }
+#else
+static inline Int weigh(Int word, int n, Weights w) { return MULTIPLY_ADD(AS_WORDS(word ^ WORD_SIGNS), w); }
+#endif
 
 static inline Int product(Int small, int factor) { return MULTIPLY_ADD(AS_WORDS(small), AS_WORDS((Int)(factor))); }
 #else
@@ -61,7 +88,14 @@ static inline Weights less(Weights w, Weights part) {
     return rest;
 }
 
+#if VOXEL == VOXEL_U8
 static inline Int weigh(Int word, int n, Weights w) { return ((word >> (8 * n)) & 0xff) * w.a + ((word >> (8 * n + 8)) & 0xff) * w.b; }
+#else
+static inline Int weigh(Int word, int n, Weights w) {
+    Int both = word ^ WORD_SIGNS;
+    return ((both << 16) >> 16) * w.a + (both >> 16) * w.b;
+}
+#endif
 
 static inline Int product(Int small, int factor) { return small * factor; }
 #endif
@@ -81,6 +115,11 @@ static inline Fixed3 add_fixed3(Fixed3 a, Fixed3 b) {
     return sum;
 }
 
+static inline Fixed3 way_fixed3(Fixed3 a, Fixed3 pace, int steps) {
+    Fixed3 sum = {a.x + pace.x * steps, a.y + pace.y * steps, a.z + pace.z * steps};
+    return sum;
+}
+
 // Where a sample is: its lowest corner in whole voxels, and the weights of the four pairs of voxels around it.
 typedef struct { Fixed3 at; Int x, y, z; Weights near, next, far, beyond; } Inner;
 
@@ -95,44 +134,65 @@ static inline Inner inner_of(Fixed3 p) {
 
 static inline Inner inner_at(Real3 p) { return inner_of(fixed3(p)); }
 
+// The offset in bytes of its lowest corner.
 static inline Int inner_offset(constant const View *view, Inner i) {
-    return (product(i.z, view->dims[1]) + i.y) * view->dims[0] + i.x;
+    return ((product(i.z, view->dims[1]) + i.y) * view->dims[0] + i.x) * VOXEL_BYTES;
 }
 
 static inline Real inner_raw(constant const View *view, VOLUME voxels, Real3 p) {
     Inner i = inner_at(p);
     Int at = inner_offset(view, i);
-    int row = view->dims[0], sheet = view->dims[0] * view->dims[1];
+    int row = view->dims[0] * VOXEL_BYTES, sheet = view->dims[1] * row;
     #define PAIR(step, weights) weigh(gather_words(voxels + (step), at), 0, weights)
-    return to_real((PAIR(0, i.near) + PAIR(row, i.next)) + (PAIR(sheet, i.far) + PAIR(sheet + row, i.beyond)));
+    return WHOLE((PAIR(0, i.near) + PAIR(row, i.next)) + (PAIR(sheet, i.far) + PAIR(sheet + row, i.beyond)));
     #undef PAIR
 }
 
-// Value and gradient by central differences, the gradient in floats beyond x. Twelve gathers instead of the 28 of seven values: a
-// gather of four voxels in x serves three of them, and rows are shared.
-static inline Real inner_gradient(constant const View *view, VOLUME voxels, Real3 p, Real3 *gradient) {
-    Inner i = inner_at(p);
+// The four rows of voxels around a place.
+typedef struct { Int here, below, behind, beyond; } Rows;
+
+// The gradient by central differences, in floats beyond x, with the rows that a value needs. Twelve gathers of bytes, or twenty of
+// words, instead of the 28 of seven values: a gather of four bytes in x serves three of them, and rows are shared.
+static inline Real3 inner_slopes(constant const View *view, VOLUME voxels, Inner i, Rows *rows) {
     Int at = inner_offset(view, i);
     Weights all = weights_at(i.at.x);
     Real fy = to_real(i.at.y & 0xffff) * 0x1p-16f, fz = to_real(i.at.z & 0xffff) * 0x1p-16f;
-    int row = view->dims[0], sheet = view->dims[0] * view->dims[1];
+    int row = view->dims[0] * VOXEL_BYTES, sheet = view->dims[1] * row;
+#if VOXEL == VOXEL_U8
     global const uchar *from = voxels - 1; // the lanes are a voxel or more inside
+    #define LINE_PLACE 1
+    #define SLOPE(y, z, v) to_real(weigh(v, 2, all) - weigh(v, 0, all))
+#else
+    global const uchar *from = voxels;
+    #define LINE_PLACE 0
+    #define SLOPE(y, z, v) to_real(weigh(gather_words(from + ((y) * row + (z) * sheet + 2), at), 0, all) - weigh(gather_words(from + ((y) * row + (z) * sheet - 2), at), 0, all))
+#endif
     #define ROW(y, z) gather_words(from + ((y) * row + (z) * sheet), at)
-    #define SLOPE(v) to_real(weigh(v, 2, all) - weigh(v, 0, all))
-    #define LINE(v) to_real(weigh(v, 1, all))
+    #define LINE(v) to_real(weigh(v, LINE_PLACE, all))
     #define LERP(a, b, f) mad((b) - (a), f, a)
     Int va = ROW(0, 0), vb = ROW(1, 0), vc = ROW(0, 1), vd = ROW(1, 1);
-    gradient->x = LERP(LERP(SLOPE(va), SLOPE(vc), fz), LERP(SLOPE(vb), SLOPE(vd), fz), fy);
+    Real3 gradient;
+    gradient.x = LERP(LERP(SLOPE(0, 0, va), SLOPE(0, 1, vc), fz), LERP(SLOPE(1, 0, vb), SLOPE(1, 1, vd), fz), fy);
     Real a = LINE(va), b = LINE(vb), c = LINE(vc), d = LINE(vd);
     Real before = LERP(LINE(ROW(-1, 0)), LINE(ROW(-1, 1)), fz), after = LERP(LINE(ROW(2, 0)), LINE(ROW(2, 1)), fz);
-    gradient->y = LERP(LERP(b, d, fz), after, fy) - LERP(before, LERP(a, c, fz), fy);
+    gradient.y = LERP(LERP(b, d, fz), after, fy) - LERP(before, LERP(a, c, fz), fy);
     before = LERP(LINE(ROW(0, -1)), LINE(ROW(1, -1)), fy), after = LERP(LINE(ROW(0, 2)), LINE(ROW(1, 2)), fy);
-    gradient->z = LERP(LERP(c, d, fy), after, fz) - LERP(before, LERP(a, b, fy), fz);
+    gradient.z = LERP(LERP(c, d, fy), after, fz) - LERP(before, LERP(a, b, fy), fz);
     #undef ROW
     #undef SLOPE
     #undef LINE
     #undef LERP
-    return to_real((weigh(va, 1, i.near) + weigh(vb, 1, i.next)) + (weigh(vc, 1, i.far) + weigh(vd, 1, i.beyond)));
+    rows->here = va, rows->below = vb, rows->behind = vc, rows->beyond = vd;
+    return gradient;
+}
+
+static inline Real inner_gradient(constant const View *view, VOLUME voxels, Real3 p, Real3 *gradient) {
+    Inner i = inner_at(p);
+    Rows r;
+    *gradient = inner_slopes(view, voxels, i, &r);
+    #define PAIR(row, weights) weigh(r.row, LINE_PLACE, weights)
+    return WHOLE((PAIR(here, i.near) + PAIR(below, i.next)) + (PAIR(behind, i.far) + PAIR(beyond, i.beyond)));
+    #undef PAIR
 }
 #else
 #define INNER_UNIT 1.0f

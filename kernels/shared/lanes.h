@@ -67,6 +67,8 @@ typedef union { Int v; int lane[LANES]; } IntLanes;
 static inline int count_lanes(Mask m) {
 #if LANES == 1
     return m != 0;
+#elif LANES == 8 && defined(__AVX2__) && __has_builtin(__builtin_ia32_movmskps256)
+    return popcount(__builtin_ia32_movmskps256(as_float8(m)));
 #elif LANES == 16 && defined(__AVX512DQ__) && __has_builtin(__builtin_ia32_cvtd2mask512)
     return popcount((ushort)__builtin_ia32_cvtd2mask512(m));
 #else
@@ -212,6 +214,13 @@ static inline Real3 select3(Real3 no, Real3 yes, Mask m) {
 #if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_rsqrt14ps512_mask)
 static inline Real inverse_root(Real v) {
     Real r = __builtin_ia32_rsqrt14ps512_mask(v, (Real)(0.0f), (short)-1);
+    return r * mad(-0.5f * v * r, r, (Real)(1.5f));
+}
+#elif LANES == 8 && defined(__AVX2__) && __has_builtin(__builtin_ia32_rsqrtps256)
+static inline Real inverse_root(Real v) {
+    // Its estimate has two bits less, so it takes another step.
+    Real r = __builtin_ia32_rsqrtps256(v);
+    r *= mad(-0.5f * v * r, r, (Real)(1.5f));
     return r * mad(-0.5f * v * r, r, (Real)(1.5f));
 }
 #else

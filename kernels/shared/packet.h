@@ -175,11 +175,18 @@ static inline void whole_steps_raw(constant const View *view, VOLUME voxels, con
 #ifdef NARROW
     if (k < p->narrow_end) {
         BlockPlaces places = block_places(view, p->low + p->low_pace * (float)k, p->low_pace);
+#if INNER_WHOLE
         Fixed3 at = fixed3(along(p->start, p->pace, (Real)((float)k))), pace = fixed3_nearest(p->pace);
         for (; i < min(end, p->narrow_end) - k; i++, at = add_fixed3(at, pace)) {
             Block block = block_at(view, voxels, &places, i);
             raw[i] = block_raw(&block, inner_of(at));
         }
+#else
+        for (; i < min(end, p->narrow_end) - k; i++) {
+            Block block = block_at(view, voxels, &places, i);
+            raw[i] = block_raw(&block, along(p->start, p->pace, (Real)((float)(k + i))));
+        }
+#endif
     }
 #endif
     for (; i < end - k; i++) raw[i] = inner_raw(view, voxels, along(p->start, p->pace, (Real)((float)(k + i))));
