@@ -10,12 +10,13 @@ use cloudchamber::technique;
 use cloudchamber::volume::VoxelType;
 use rayon::prelude::*;
 
+use super::common::{kernel_cache, kernels, say};
 use super::compiler::{Compiler, LEVELS, Level};
 
 fn compiler() -> &'static Compiler {
     static COMPILER: OnceLock<Compiler> = OnceLock::new();
     COMPILER.get_or_init(|| {
-        device::keep_compiled_kernels_in(&super::common::kernel_cache()).unwrap();
+        device::keep_compiled_kernels_in(&kernel_cache()).unwrap();
         Compiler::of(&device::select("pocl", None).unwrap().1.platform_version)
     })
 }
@@ -33,7 +34,7 @@ fn one_of(variants: &[Variant], kernel: usize, level: usize) -> Variant {
 }
 
 fn compile(compiler: &Compiler, level: &Level, source: &Source, variant: &Variant) -> Result<bool, String> {
-    let text = source.text(super::common::kernels().as_deref()).unwrap();
+    let text = source.text(kernels().as_deref()).unwrap();
     let built = compiler.compile_once(level, &variant.options(level.lanes, false), &text);
     built.map_err(|said| format!("{} ({}, {} lanes): {}:\n{said}", level.name, level.cpu, level.lanes, variant.label()))
 }
@@ -44,7 +45,12 @@ fn all_build(jobs: &[(&Level, &Source, Variant)]) {
     let done: Vec<_> =
         jobs.par_iter().map(|(level, source, variant)| compile(compiler, level, source, variant)).collect();
     let anew = done.iter().filter(|d| matches!(d, Ok(true))).count();
-    println!("{} kernels, {anew} of them compiled anew, in {:.1} s", jobs.len(), started.elapsed().as_secs_f64());
+    let seconds = started.elapsed().as_secs_f64();
+    say(&format!(
+        "{} kernels for {} levels, {anew} of them compiled anew, in {seconds:.1} s",
+        jobs.len(),
+        LEVELS.len()
+    ));
     let faults: Vec<_> = done.into_iter().filter_map(Result::err).collect();
     assert!(faults.is_empty(), "{} of {} do not build:\n{}", faults.len(), jobs.len(), faults.join("\n"));
 }
@@ -63,7 +69,7 @@ fn every_kernel_builds_at_every_level() {
 #[test]
 fn every_variant_builds_at_every_level() {
     if !super::is_full() {
-        return println!("not run: ./dev test --full compiles every variant for every level");
+        return say("not run: every variant at every level (./dev test --full compiles them)");
     }
     let sources = sources();
     let mut jobs = Vec::new();

@@ -68,7 +68,7 @@ impl Compiler {
     }
 
     /// Compiles to the level's assembly: clang says some things only while it makes code, such as that a vector is too wide to be passed
-    /// (`-Wpsabi`), and the level's instructions are chosen last of all. Without optimisation, which says nothing more and doubles the time.
+    /// (`-Wpsabi`), and the level's instructions are chosen last of all. It does not optimise, which would take twice as long.
     ///
     /// # Errors
     /// What the compiler says.

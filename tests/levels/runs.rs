@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use super::common::pictures::{self, Asked};
+use super::common::say;
 use super::lower::{Lower, Picture, Program};
 
 /// How far apart pictures are: the greatest difference of a value and of a byte, and of the means of the three colours.
@@ -52,7 +53,7 @@ fn one_of_each_technique() -> Vec<Asked> {
 fn a_tiny_picture_is_the_same_at_the_level_below() {
     let program = Program::new();
     let Some(lower) = program.levels_below().first().copied() else {
-        return println!("not run: this host has no level below its own");
+        return say("not run: a picture at the level below the host's, for there is none");
     };
     check_same(&program, lower, &one_of_each_technique()[0]);
 }
@@ -60,12 +61,14 @@ fn a_tiny_picture_is_the_same_at_the_level_below() {
 #[test]
 fn a_picture_of_each_technique_is_the_same_at_each_level_below() {
     if !super::is_full() {
-        return println!("not run: ./dev test --full makes a picture of each technique at each level below the host's");
+        return say(
+            "not run: a picture of each technique at each level below the host's (./dev test --full makes them)",
+        );
     }
     let program = Program::new();
     let below = program.levels_below();
     if below.is_empty() {
-        println!("not run: this host has no level below its own");
+        say("not run: pictures at the levels below the host's, for there are none");
     }
     for lower in below {
         for asked in one_of_each_technique() {
