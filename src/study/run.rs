@@ -5,9 +5,9 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use serde_json::json;
 
 use super::bench::{Bench, Reads, Run};
-use super::record::{Choice, Line, Machine, Point, Record};
 #[cfg(feature = "flip")]
 use super::flip;
+use super::record::{Choice, Line, Machine, Point, Record};
 use super::{Case, Scale, Setting, Trial, Truth, fit, measure};
 use crate::chart::plain;
 use crate::error::Result;

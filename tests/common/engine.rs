@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 
 use clap::Parser;
 use cloudchamber::config::Limits;
-use cloudchamber::device::{self, DeviceConfig};
+use cloudchamber::device::{self, DeviceConfig, DeviceInfo};
 use cloudchamber::film::{ErrorEstimate, Film};
 use cloudchamber::job::{Engine, Job, State};
 use cloudchamber::scene::Scene;
@@ -36,7 +36,7 @@ impl House {
         let limits = Flags::parse_from(["test"]).limits;
         let store = Store::open(&data.path().join("volumes"), limits.store()).unwrap();
         let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().unwrap();
-        let config = DeviceConfig { lanes, ..DeviceConfig::pocl() };
+        let config = DeviceConfig { lanes, kernels: super::kernels(), ..DeviceConfig::pocl() };
         let engine = runtime.block_on(async { Engine::start(config, limits.clone()) }).unwrap();
         runtime.block_on(engine.ready()).unwrap();
         Self { engine, store, limits, runtime, _data: data }
@@ -46,6 +46,11 @@ impl House {
     pub fn shared() -> &'static Self {
         static HOUSE: OnceLock<House> = OnceLock::new();
         HOUSE.get_or_init(|| Self::new(None))
+    }
+
+    /// What its device says of itself.
+    pub fn info(&self) -> Arc<DeviceInfo> {
+        self.runtime.block_on(self.engine.ready()).unwrap()
     }
 
     /// Runs a request to its end.

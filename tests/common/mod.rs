@@ -5,6 +5,7 @@
 
 pub mod engine;
 pub mod light;
+pub mod pictures;
 pub mod processes;
 
 use std::io::{BufRead, BufReader};
@@ -30,6 +31,17 @@ pub struct Server {
 pub fn kernel_cache() -> PathBuf {
     std::env::var_os("POCL_CACHE_DIR")
         .map_or_else(|| PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("kernels"), PathBuf::from)
+}
+
+/// Says what a test that passes did not do: the macros that print would be silenced.
+pub fn say(words: &str) {
+    use std::io::Write;
+    drop(writeln!(std::io::stderr(), "{words}"));
+}
+
+/// A folder of kernels in place of the binary's, such as those of an earlier commit.
+pub fn kernels() -> Option<PathBuf> {
+    std::env::var_os("CLOUDCHAMBER_KERNELS").map(PathBuf::from)
 }
 
 impl Server {
