@@ -133,22 +133,30 @@ static inline void see(constant const View *view, constant const EmissionAbsorpt
 #if SHADED
 #if NARROW_GRADIENTS
     BlockPlaces places = block_places(view, p->low + p->low_pace * (float)k, p->low_pace);
+#if INNER_WHOLE
     Fixed3 at = fixed3(along(p->start, p->pace, (Real)((float)k))), pace = fixed3_nearest(p->pace);
+    #define NEXT at = add_fixed3(at, pace)
+    #define GRADIENT(i) narrow_gradient(view, voxels, &places, i, inner_of(at))
+#else
+    #define NEXT (void)0
+    #define GRADIENT(i) narrow_gradient(view, voxels, &places, i, along(p->start, p->pace, (Real)((float)(k + i))))
+#endif
+#else
+    #define NEXT (void)0
+    #define GRADIENT(i) inner_gradient_at(view, voxels, along(p->start, p->pace, (Real)((float)(k + i))))
 #endif
     Real3 colour[STRIDE], gradient[STRIDE];
     Real weight[STRIDE];
     int lit = 0;
-    for (int i = 0; i < end - k; i++) {
+    for (int i = 0; i < end - k; i++, NEXT) {
         Optical o = optical_at(table, span, form, place[i]);
         weight[lit] = weight_of(params, o.alpha, r);
         if (!any_lane(MASK(weight[lit] > 0.0f))) continue;
         colour[lit] = o.colour;
-#if NARROW_GRADIENTS
-        gradient[lit++] = narrow_gradient(view, voxels, &places, i, inner_of(way_fixed3(at, pace, i)));
-#else
-        inner_gradient(view, voxels, along(p->start, p->pace, (Real)((float)(k + i))), &gradient[lit++]);
-#endif
+        gradient[lit++] = GRADIENT(i);
     }
+    #undef GRADIENT
+    #undef NEXT
     for (int i = 0; i < lit; i++) add_light(shade(view, gradient[i], GRADIENT_UNIT, p->half_way, colour[i]), weight[i], r);
 #else
     for (int i = 0; i < end - k; i++) composite(params, optical_at(table, span, form, place[i]), r);

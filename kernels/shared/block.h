@@ -19,8 +19,8 @@ static inline int4 load_rows(global const uchar *from, int row) {
     return (int4)(INT_AT(from), INT_AT(from + row), INT_AT(from + 2 * row), INT_AT(from + 3 * row));
 }
 
-// Gradients come from the block, too, where a register holds all of it.
-#define NARROW_GRADIENTS (SHADED && LANES == 16 && VOXEL == VOXEL_U8)
+// Gradients come from blocks, too, where they are worth their loads.
+#define NARROW_GRADIENTS (SHADED && LANES == 16)
 #if NARROW_GRADIENTS
 // Voxels that are read before and after the block, and the fewest a side that this leaves room for.
 #define AROUND 1
@@ -103,7 +103,7 @@ static inline Real block_voxel(const Block *b, Int at) {
     return select(low, high, at << 26);
 }
 
-// The same arithmetic as inner_raw's.
+// What lies between them, by the arithmetic of inner_raw.
 static inline Real block_raw(const Block *b, Real3 p) {
     Int ix = to_int(p.x), iy = to_int(p.y), iz = to_int(p.z), at = (iz << 4) + (iy << 2) + ix + b->first;
     Real fx = p.x - to_real(ix), fy = p.y - to_real(iy), fz = p.z - to_real(iz);
@@ -122,12 +122,14 @@ static inline Real block_raw(const Block *block, Inner i) {
     #undef PAIR
 }
 #else
-static inline Real block_raw(const Block *block, Inner i) {
+static inline Int block_sum(const Block *block, Inner i) {
     Int word = (i.z << 4) + (i.y << 2) + i.x + block->first, pair = (word | (word << 16)) + 0x10000;
     #define PAIR(n, weights) MULTIPLY_ADD(__builtin_ia32_vpermi2varhi512(block->low, AS_WORDS(pair + (n) * 0x10001), block->high) ^ AS_WORDS((Int)(WORD_SIGNS)), weights)
-    return WHOLE((PAIR(0, i.near) + PAIR(4, i.next)) + (PAIR(16, i.far) + PAIR(20, i.beyond)));
+    return (PAIR(0, i.near) + PAIR(4, i.next)) + (PAIR(16, i.far) + PAIR(20, i.beyond));
     #undef PAIR
 }
+
+static inline Real block_raw(const Block *block, Inner i) { return WHOLE(block_sum(block, i)); }
 #endif
 
 // The same of a single step, whose least place is `low`.
@@ -143,7 +145,7 @@ static inline Real narrow_raw(constant const View *view, VOLUME voxels, Real3 p,
 #endif
 }
 
-#if NARROW_GRADIENTS
+#if NARROW_GRADIENTS && VOXEL == VOXEL_U8
 // For gradients the block with what is around it: its rows from a voxel before to three after, two registers of eight, and four rows
 // each beside it: before and after in y for each z, before and after in z for each y.
 typedef struct { long8 low, high; Int beside; } WideBlock;
@@ -202,6 +204,30 @@ static inline Real3 narrow_gradient(constant const View *view, VOLUME voxels, co
     Field y = field_of(ROW_AFTER(rows, b.beside), ROW_BEFORE(rows, b.beside));
     Field z = field_of(SHEET_AFTER(rows, b.beside), SHEET_BEFORE(rows, b.beside));
     return real3(field_between(x, pair, &i), field_between(y, pair, &i), field_between(z, pair, &i));
+}
+#elif NARROW_GRADIENTS
+// The gradient by central differences in step k of eight: what the blocks a voxel to each side differ by.
+static inline Real3 narrow_gradient(constant const View *view, VOLUME voxels, const BlockPlaces *places, int k,
+#if INNER_WHOLE
+                                    Inner i) {
+#else
+                                    Real3 p) {
+#endif
+    int row = view->dims[0] * VOXEL_BYTES, sheet = view->dims[1] * row;
+    global const uchar *from = voxels + (size_t)places->offset[k] * VOXEL_BYTES;
+    #define AT(step) block_from(view, from + (step), places->rows[k], places->bytes[k], places->words[k])
+#if INNER_WHOLE
+    #define SLOPE(step) ({ Block after = AT(step), before = AT(-(step)); to_real(block_sum(&after, i) - block_sum(&before, i)); })
+#else
+    #define SLOPE(step) ({                                                                              \
+        Block after = AT(step), before = AT(-(step));                                                   \
+        for (int z = 0; z < 4; z++) after.sheet[z] -= before.sheet[z];                                  \
+        block_raw(&after, p);                                                                           \
+    })
+#endif
+    return real3(SLOPE(VOXEL_BYTES), SLOPE(row), SLOPE(sheet));
+    #undef SLOPE
+    #undef AT
 }
 #endif
 #endif

@@ -115,11 +115,6 @@ static inline Fixed3 add_fixed3(Fixed3 a, Fixed3 b) {
     return sum;
 }
 
-static inline Fixed3 way_fixed3(Fixed3 a, Fixed3 pace, int steps) {
-    Fixed3 sum = {a.x + pace.x * steps, a.y + pace.y * steps, a.z + pace.z * steps};
-    return sum;
-}
-
 // Where a sample is: its lowest corner in whole voxels, and the weights of the four pairs of voxels around it.
 typedef struct { Fixed3 at; Int x, y, z; Weights near, next, far, beyond; } Inner;
 
@@ -219,6 +214,13 @@ static inline Real inner_gradient(constant const View *view, VOLUME voxels, Real
     return inner_raw(view, voxels, p);
 }
 #endif
+
+// The gradient alone.
+static inline Real3 inner_gradient_at(constant const View *view, VOLUME voxels, Real3 p) {
+    Real3 gradient;
+    inner_gradient(view, voxels, p, &gradient);
+    return gradient;
+}
 
 // A place or a way in index units as inner_raw takes it: places count from the middle of voxel 0.
 static inline Real3 inner_way(Real3 way) { return scale3(way, (Real)(INNER_PLACES)); }

@@ -162,7 +162,8 @@ static inline int beam_leap(constant const View *view, const Beam *b, global con
 // The raw value at the sample of a step that is whole in every lane: inner <= k < inner_end.
 static inline __attribute__((always_inline)) Real whole_step_raw(constant const View *view, VOLUME voxels, const Packet *p, int k) {
     Real3 place = along(p->start, p->pace, (Real)((float)k));
-#ifdef NARROW
+    // A block for one step pays where a register holds it.
+#if defined(NARROW) && LANES == 16 && VOXEL == VOXEL_U8
     if (k < p->narrow_end) return narrow_raw(view, voxels, place, p->low + p->low_pace * (float)k) * INNER_UNIT;
 #endif
     return inner_raw(view, voxels, place) * INNER_UNIT;
