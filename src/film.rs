@@ -5,6 +5,8 @@ mod estimate;
 mod lowered;
 pub mod picture;
 mod rounds;
+mod srgb;
+mod sums;
 
 use std::sync::Arc;
 
@@ -27,7 +29,8 @@ pub struct Samples {
     pub count: u32,
     /// Mean linear R, G, B and alpha of every pixel.
     pub mean: Vec<f32>,
-    /// Sum of squared deviations of the luminance of every pixel; NaN where a sample was not finite.
+    /// Sum of squared deviations of the luminance of every pixel; NaN where a sample was not finite. Empty where it was not read: of one
+    /// sample that was finite everywhere.
     pub m2: Vec<f32>,
     /// Samples by tile, where they were put where the error is.
     pub tiles: Option<Tiles>,
@@ -127,27 +130,11 @@ impl Samples {
 
     /// Pixels of which a sample was not finite.
     pub fn unknown_pixels(&self) -> usize {
-        self.m2.iter().filter(|v| !v.is_finite()).count()
+        self.m2.par_chunks(PART).map(|part| part.iter().filter(|v| !v.is_finite()).count()).sum()
     }
 
     fn mean_luminance(&self) -> f64 {
         self.sum(luminance) / self.pixels().max(1) as f64
-    }
-
-    /// Root mean square of the deviation from the mean of each 2×2 block: what half the resolution would lose, which bounds
-    /// what this resolution loses on a picture that is smooth at its scale.
-    fn resolution_error(&self) -> f64 {
-        let (mut sum, mut blocks) = (0.0, 0usize);
-        for y in (0..self.height.saturating_sub(1)).step_by(2) {
-            for x in (0..self.width.saturating_sub(1)).step_by(2) {
-                let at = y * self.width + x;
-                let four = [at, at + 1, at + self.width, at + self.width + 1].map(|i| self.luminance(i));
-                let mean = four.iter().sum::<f64>() / 4.0;
-                sum += four.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / 4.0;
-                blocks += 1;
-            }
-        }
-        (sum / blocks.max(1) as f64).sqrt()
     }
 }
 

@@ -1,29 +1,25 @@
 //! A picture with its description as PNG or OpenEXR bytes.
 
+mod stripes;
+
 use std::borrow::Cow;
+use std::ops::Range;
 
 use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage};
 
 use crate::error::{Error, Result};
+pub(crate) use stripes::{Deflated, rows, stripes};
 
-/// 8-bit sRGB, three or four bytes a pixel, as PNG, by the encoder's fast path: a frame is looked at once. `description` goes into its text chunk, under the
-/// keyword `Cloudchamber`.
+/// 8-bit sRGB, three or four bytes a pixel, as PNG, by a fast encoder: a frame is looked at once. `description` goes into its text chunk,
+/// under the keyword `Cloudchamber`.
 ///
 /// # Errors
 /// [`Error::Internal`] when the encoder fails.
-pub fn png([width, height]: [usize; 2], picture: &[u8], description: String) -> Result<Vec<u8>> {
-    let mut bytes = Vec::with_capacity(picture.len() / 2);
-    let alpha = picture.len() == 4 * width * height;
-    let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
-    encoder.set_color(if alpha { png::ColorType::Rgba } else { png::ColorType::Rgb });
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_compression(png::Compression::Fast);
-    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
-    encoder.add_text_chunk("Cloudchamber".into(), description).map_err(Error::internal)?;
-    let mut writer = encoder.write_header().map_err(Error::internal)?;
-    writer.write_image_data(picture).map_err(Error::internal)?;
-    writer.finish().map_err(Error::internal)?;
-    Ok(bytes)
+pub fn png(size: [usize; 2], picture: &[u8], description: String) -> Result<Vec<u8>> {
+    let channels = if picture.len() == 4 * size[0] * size[1] { 4 } else { 3 };
+    let row = size[0] * channels;
+    let copy = |rows: Range<usize>, out: &mut [u8]| out.copy_from_slice(&picture[rows.start * row..rows.end * row]);
+    Deflated::new(size, channels, copy)?.0.png(description)
 }
 
 /// Linear RGB, or RGB and alpha, in 32-bit floats as OpenEXR, with a channel `standard_error` of the luminance where it is given;

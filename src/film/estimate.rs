@@ -3,7 +3,8 @@
 use serde::Serialize;
 
 use super::rounds::SURE;
-use super::{Film, Samples, luminance};
+use super::sums::Sums;
+use super::{Film, Samples};
 
 /// The estimated error of a picture: root mean square over its pixels of the error of linear luminance, divided by the
 /// picture's mean luminance (absolute where that is 0). A part is null where it is not known apart from the others.
@@ -27,14 +28,21 @@ pub struct ErrorEstimate {
 impl Film {
     /// The error as it can be told from the samples alone.
     pub fn error(&self) -> ErrorEstimate {
-        let mean = self.main.mean_luminance();
+        self.error_of(&self.sums())
+    }
+
+    /// The error, of the sums over all samples.
+    pub(super) fn error_of(&self, sums: &Sums) -> ErrorEstimate {
+        let pixels = self.main.pixels().max(1) as f64;
+        let mean = sums.luminance / pixels;
         let relative = |absolute: f64| if mean > 0.0 { absolute / mean } else { absolute };
+        let block = (sums.blocks / sums.block_count.max(1) as f64).sqrt();
         let noise = match self.main.count {
             // Of noise a 2×2 block's mean takes a quarter of the variance away.
-            0 | 1 => self.noisy.then(|| self.main.resolution_error() * (4.0f64 / 3.0).sqrt()),
-            _ => Some(self.known_noise(SURE).0),
+            0 | 1 => self.noisy.then(|| block * (4.0f64 / 3.0).sqrt()),
+            _ => Some(self.noise_of(sums, SURE).0),
         };
-        let truncation = self.truncation();
+        let truncation = (sums.truncated / pixels).sqrt();
         let (discretisation, joint) = match (&self.control, self.main.stride) {
             (Some(control), 1) => self.against(control),
             _ if self.stepless => (Some(0.0), None),
@@ -43,7 +51,7 @@ impl Film {
             }
             _ => (None, None),
         };
-        let resolution = (self.main.stride > 1).then(|| self.main.resolution_error());
+        let resolution = (self.main.stride > 1).then_some(block);
         let parts = [noise, discretisation.or(joint), resolution, Some(truncation)];
         let own = parts.iter().flatten().map(|e| e * e).sum::<f64>().sqrt();
         let total = relative(own).hypot(self.field_error.unwrap_or(0.0));
@@ -60,15 +68,21 @@ impl Film {
     /// The standard error of the mean over random samples, of luminance, root mean square over the pixels; and how many pixels it is of:
     /// (Σ sᵢ²)² / Σ sᵢ⁴.
     pub(crate) fn random_noise(&self) -> (f64, f64) {
-        let squared = |i: usize| Some(self.main.squared_error(i)).filter(|e| e.is_finite()).unwrap_or(0.0);
-        let add = |(sum, squares): (f64, f64), s: f64| (sum + s, squares + s * s);
-        let (sum, squares) = (0..self.main.pixels()).map(squared).fold((0.0, 0.0), add);
+        self.random_noise_of(&self.sums())
+    }
+
+    fn random_noise_of(&self, sums: &Sums) -> (f64, f64) {
+        let (sum, squares) = (sums.noise, sums.noise_squares);
         ((sum / self.main.pixels().max(1) as f64).sqrt(), if squares > 0.0 { sum * sum / squares } else { 0.0 })
     }
 
     /// The noise, and whether the samples are spread better than random ones, by so many `deviations`.
     pub(crate) fn known_noise(&self, deviations: f64) -> (f64, bool) {
-        let (random, pixels) = self.random_noise();
+        self.noise_of(&self.sums(), deviations)
+    }
+
+    fn noise_of(&self, sums: &Sums, deviations: f64) -> (f64, bool) {
+        let (random, pixels) = self.random_noise_of(sums);
         let spread = self.halves.and_then(|h| h.noise(self.main.count, random, pixels, deviations));
         spread.map_or((random, false), |noise| (noise, true))
     }
@@ -96,15 +110,6 @@ impl Film {
             return (None, Some((squared / pixels).sqrt()));
         }
         (Some(((squared - noise) / pixels).max(0.0).sqrt()), None)
-    }
-
-    /// Rays that ended early leave out what is behind: at most what is in front of it, times what still gets through.
-    fn truncation(&self) -> f64 {
-        let ended = |p: &[f32]| {
-            let through = 1.0 - f64::from(p[3]);
-            if through <= 1.0 - self.opacity_threshold { (through.max(0.0) * luminance(p)).powi(2) } else { 0.0 }
-        };
-        (self.main.sum(ended) / self.main.pixels().max(1) as f64).sqrt()
     }
 }
 

@@ -1,12 +1,14 @@
 //! The picture of a film: over its background, in linear floats or sRGB bytes.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::{ErrorEstimate, Film, PART};
+use super::sums::Sums;
+use super::{ErrorEstimate, Film, srgb};
 use crate::error::Result;
-use crate::frame;
+use crate::frame::{self, Deflated};
 
 /// What is behind the volume.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,14 +34,22 @@ impl Film {
         .to_string()
     }
 
-    /// The film as PNG bytes, its error, and how many values were clipped at white. Error and colours are worked out side by side:
-    /// a client that turns the camera waits for both.
+    /// The film as PNG bytes, its error, and how many values were clipped at white. A stripe's pixels are added up, coloured and deflated
+    /// while they are in a core's cache.
     ///
     /// # Errors
     /// `Error::Internal` when the encoder fails.
     pub fn png(&self) -> Result<(Vec<u8>, ErrorEstimate, u64)> {
-        let (error, (bytes, clipped)) = rayon::join(|| self.error(), || self.srgb8());
-        Ok((frame::png(self.size, &bytes, self.description(&error))?, error, clipped))
+        let whole = self.is_whole();
+        let stripe = |rows: Range<usize>, out: &mut [u8]| {
+            let sums = whole.then(|| self.sums_of(rows.clone()));
+            (sums.unwrap_or_default(), self.colour(rows, out))
+        };
+        let (deflated, parts) = Deflated::new(self.size, self.channels(), stripe)?;
+        let (sums, clipped): (Vec<Sums>, Vec<u64>) = parts.into_iter().unzip();
+        // A preview has other rows than its picture.
+        let error = if whole { self.error_of(&sums.into_iter().sum()) } else { self.error() };
+        Ok((deflated.png(self.description(&error))?, error, clipped.iter().sum()))
     }
 
     /// The film as OpenEXR bytes; a transparent one has an alpha channel and is premultiplied, as is usual there. Of two samples or more
@@ -49,7 +59,7 @@ impl Film {
     /// `Error::Internal` when the encoder fails.
     pub fn exr(&self, error: &ErrorEstimate) -> Result<Vec<u8>> {
         let picture: Vec<f32> = match self.background {
-            Background::Colour(behind) => self.rgba().chunks_exact(4).flat_map(|p| over(p, behind)).collect(),
+            Background::Colour(behind) => self.rgba().chunks_exact(4).flat_map(|p| srgb::over(p, behind)).collect(),
             Background::Transparent => self.rgba().into_owned(),
         };
         let known = self.main.stride == 1 && self.main.count >= 2;
@@ -57,23 +67,36 @@ impl Film {
         frame::exr(self.size, &picture, errors, &self.description(error))
     }
 
-    /// The samples in linear R, G, B (premultiplied) and alpha, row by row from the top; a preview is interpolated to the full
-    /// size.
+    /// Whether the picture has the samples' own pixels.
+    fn is_whole(&self) -> bool {
+        self.main.stride == 1 && self.size == [self.main.width, self.main.height]
+    }
+
+    fn channels(&self) -> usize {
+        if self.background == Background::Transparent { 4 } else { 3 }
+    }
+
+    /// All samples in linear R, G, B (premultiplied) and alpha, row by row from the top.
     fn rgba(&self) -> Cow<'_, [f32]> {
-        let [width, height] = self.size;
-        if self.main.stride == 1 {
-            return Cow::Borrowed(&self.main.mean);
+        self.rgba_of(0..self.size[1])
+    }
+
+    /// The same of some rows; a preview is interpolated to the full size.
+    fn rgba_of(&self, rows: Range<usize>) -> Cow<'_, [f32]> {
+        let width = self.size[0];
+        if self.is_whole() {
+            return Cow::Borrowed(&self.main.mean[4 * width * rows.start..4 * width * rows.end]);
         }
-        let mut out = Vec::with_capacity(width * height * 4);
+        let mut out = Vec::with_capacity(width * rows.len() * 4);
         let place = |full: usize, n: usize| {
             let at = (full as f32 / self.main.stride as f32).min((n - 1) as f32);
             let low = (at as usize).min(n.saturating_sub(2));
             (low, (low + 1).min(n - 1), at - low as f32)
         };
-        for y in 0..height {
+        let across: Vec<_> = (0..width).map(|x| place(x, self.main.width)).collect();
+        for y in rows {
             let (y0, y1, fy) = place(y, self.main.height);
-            for x in 0..width {
-                let (x0, x1, fx) = place(x, self.main.width);
+            for &(x0, x1, fx) in &across {
                 for c in 0..4 {
                     let at = |x: usize, y: usize| self.main.mean[4 * (y * self.main.width + x) + c];
                     let (top, low) =
@@ -85,60 +108,21 @@ impl Film {
         Cow::Owned(out)
     }
 
+    /// Writes the sRGB bytes of some rows; how many values were clipped.
+    fn colour(&self, rows: Range<usize>, out: &mut [u8]) -> u64 {
+        srgb::encode(&self.rgba_of(rows), self.background, out)
+    }
+
     /// The picture in sRGB bytes (IEC 61966-2-1), clipped at 1, and how many values were clipped: three a pixel, or four with
     /// an alpha that is not multiplied into them.
     pub fn srgb8(&self) -> (Vec<u8>, u64) {
-        let pixels = self.rgba();
-        let channels = if self.background == Background::Transparent { 4 } else { 3 };
-        let mut out = vec![0u8; pixels.len() / 4 * channels];
-        let parts = pixels.par_chunks(4 * PART).zip(out.par_chunks_mut(channels * PART));
-        let clipped = parts.map(|(pixels, out)| encode(pixels, self.background, out)).sum();
+        let row = self.size[0] * self.channels();
+        let mut out = vec![0u8; self.size[1] * row];
+        let rows = frame::rows(self.size);
+        let parts = frame::stripes(self.size).zip(out.par_chunks_mut((rows * row).max(1)));
+        let clipped = parts.map(|(rows, out)| self.colour(rows, out)).sum();
         (out, clipped)
     }
-}
-
-/// Writes the pixels' sRGB bytes; how many values were clipped.
-fn encode(pixels: &[f32], background: Background, out: &mut [u8]) -> u64 {
-    let pixels = pixels.chunks_exact(4);
-    match background {
-        Background::Colour(behind) => {
-            pixels.zip(out.chunks_exact_mut(3)).map(|(p, out)| encode_colour(over(p, behind), out)).sum()
-        }
-        Background::Transparent => {
-            let encode = |(p, out): (&[f32], &mut [u8])| {
-                let scale = if p[3] > 0.0 { 1.0 / p[3] } else { 0.0 };
-                out[3] = (p[3].clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
-                encode_colour([p[0] * scale, p[1] * scale, p[2] * scale], &mut out[..3])
-            };
-            pixels.zip(out.chunks_exact_mut(4)).map(encode).sum()
-        }
-    }
-}
-
-/// Writes three sRGB bytes; how many values were clipped.
-#[inline(always)]
-fn encode_colour(colour: [f32; 3], out: &mut [u8]) -> u64 {
-    let (table, mut clipped) = (srgb_table(), 0);
-    for (v, byte) in colour.into_iter().zip(out) {
-        clipped += u64::from(v > 1.0);
-        *byte = table[usize::from((v.clamp(0.0, 1.0) * 65535.0 + 0.5) as u16)];
-    }
-    clipped
-}
-
-/// A premultiplied pixel over a colour.
-fn over(p: &[f32], behind: [f32; 3]) -> [f32; 3] {
-    let through = 1.0 - p[3];
-    [p[0] + through * behind[0], p[1] + through * behind[1], p[2] + through * behind[2]]
-}
-
-/// sRGB bytes by linear value in steps of 2^-16: a step is a twentieth of a grey level where the curve is steepest.
-fn srgb_table() -> &'static [u8; 1 << 16] {
-    static TABLE: std::sync::LazyLock<Box<[u8; 1 << 16]>> = std::sync::LazyLock::new(|| {
-        let encode = |v: f64| if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
-        Box::new(std::array::from_fn(|i| (encode(i as f64 / 65535.0) * 255.0).round() as u8))
-    });
-    &TABLE
 }
 
 #[cfg(test)]

@@ -74,7 +74,7 @@ impl Layer {
     pub fn choose_tiles(&mut self, context: &DeviceContext, adaptive: bool) -> Result<()> {
         let samples = self.samples;
         if adaptive && self.tiling.as_ref().is_some_and(|(t, _)| t.is_due(samples)) {
-            let read = self.read(context)?;
+            let read = self.read(context, true)?;
             if let Some((tiling, buffer)) = &mut self.tiling {
                 if tiling.wants_costs() {
                     let mut costs = vec![0u32; tiling.tiles()];
@@ -99,12 +99,15 @@ impl Layer {
         (self.width.div_ceil(beam_w) * self.height.div_ceil(beam_h), beam_w * beam_h)
     }
 
-    /// What was gathered.
-    pub fn read(&self, context: &DeviceContext) -> Result<Samples> {
+    /// What was gathered, with the squared deviations of the samples or without.
+    pub fn read(&self, context: &DeviceContext, deviations: bool) -> Result<Samples> {
         let pixels = self.width * self.height;
-        let (mut mean, mut m2) = (vec![0.0f32; 4 * pixels], vec![0.0f32; pixels]);
+        let (mut mean, mut m2) = (vec![0.0f32; 4 * pixels], Vec::new());
         context.device.read(&self.buffer, 0, &mut mean)?;
-        context.device.read(&self.buffer, 16 * pixels, &mut m2)?;
+        if deviations {
+            m2 = vec![0.0f32; pixels];
+            context.device.read(&self.buffer, 16 * pixels, &mut m2)?;
+        }
         let tiles = self.tiling.as_ref().and_then(|(tiling, _)| tiling.counts());
         Ok(Samples {
             width: self.width,

@@ -37,7 +37,7 @@ impl Rounds {
         if !wanted {
             return Ok(());
         }
-        let main = layer.read(context)?;
+        let main = layer.read(context, false)?;
         let luminance = (0..main.pixels()).map(|i| main.luminance(i) as f32).collect();
         let round = Round { samples, device_ms: device_time.as_secs_f64() * 1e3, luminance };
         if whole {

@@ -333,11 +333,13 @@ impl ViewRun {
             _ => Lowered { apart: control.stride as u32, step: if self.plan.stepless { 1.0 } else { 2.0 } },
         };
         let controlled = main.samples > 0 && control.samples > 0 && !self.plan.stepless;
-        let control = controlled.then(|| control.read(context)).transpose()?;
+        let control = controlled.then(|| control.read(context, false)).transpose()?;
         let opacity_threshold = self.plan.opacity_threshold;
+        // Of one sample a pixel has no deviation: it tells only where that sample was not finite.
+        let deviations = shown.samples > 1 || shown.tiles().is_some() || self.counts(context)?.non_finite > 0;
         Ok(Film {
             size: self.size,
-            main: shown.read(context)?,
+            main: shown.read(context, deviations)?,
             control,
             paired: self.paired(),
             stepless: self.plan.stepless,
