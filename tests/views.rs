@@ -14,6 +14,8 @@ mod proportions;
 mod support;
 #[path = "views/turned.rs"]
 mod turned;
+#[path = "views/words.rs"]
+mod words;
 #[allow(dead_code, reason = "only the NIfTI header is wanted here")]
 #[path = "volumes/writers.rs"]
 mod writers;

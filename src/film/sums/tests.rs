@@ -12,12 +12,12 @@ fn number(i: usize, seed: usize) -> f32 {
 /// A film, a third of it empty, some of its pixels opaque, and some of unknown error.
 fn film([width, height]: [usize; 2], count: u32, tiled: bool, stride: usize) -> Film {
     let pixels = width * height;
-    let empty = |i: usize| i / 40 % 3 == 0;
+    let empty = |i: usize| (i / 40).is_multiple_of(3);
     let colour = |i: usize| {
-        let alpha = if i % 5 == 0 { 1.0 - 0.01 * number(i, 4) } else { number(i, 5) };
+        let alpha = if i.is_multiple_of(5) { 1.0 - 0.01 * number(i, 4) } else { number(i, 5) };
         if empty(i) { [0.0; 4] } else { [number(i, 1), number(i, 2), number(i, 3), alpha] }
     };
-    let m2 = (0..pixels).map(|i| if i % 97 == 0 { f32::NAN } else { number(i, 6) });
+    let m2 = (0..pixels).map(|i| if i.is_multiple_of(97) { f32::NAN } else { number(i, 6) });
     let (side, wide) = (16, width.div_ceil(16));
     let counts = (0..wide * height.div_ceil(side)).map(|i| i as u32 % 7).collect();
     let main = Samples {
