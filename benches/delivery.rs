@@ -52,7 +52,11 @@ fn scene(volume: &str, side: u32, frame: usize) -> Value {
 impl Client {
     fn new() -> Self {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
-        Self { server: Server::start(), http: reqwest::Client::builder().no_proxy().build().unwrap(), runtime }
+        Self {
+            server: Server::start().once_compiled(),
+            http: reqwest::Client::builder().no_proxy().build().unwrap(),
+            runtime,
+        }
     }
 
     fn url(&self, path: &str) -> String {

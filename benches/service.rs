@@ -43,7 +43,7 @@ struct Delivered {
 
 impl Bench {
     fn new(flags: &[&str]) -> Self {
-        let server = Server::start_with(flags);
+        let server = Server::start_with(flags).once_compiled();
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
         let client = reqwest::Client::builder().no_proxy().build().unwrap();
         let upload = client.post(format!("{}/v1/volumes", server.url())).body(common::mri_head());

@@ -91,7 +91,7 @@ pub struct Client {
 impl Client {
     pub fn new(flags: &[&str]) -> Self {
         Self {
-            server: Server::start_with(flags),
+            server: Server::start_with(flags).once_compiled(),
             runtime: tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap(),
             client: reqwest::Client::builder().no_proxy().build().unwrap(),
         }

@@ -98,8 +98,13 @@ static inline ULong ulong_where(Mask m, ULong v) { ULong r = {v.all & (ulong)(lo
 #define HALF 2
 #endif
 typedef JOIN(ulong, HALF) HalfULong;
+#if __has_builtin(__builtin_convertvector)
+#define to_half_long(v) __builtin_convertvector(v, JOIN(long, HALF))
+#define to_half_ulong(v) __builtin_convertvector(v, JOIN(ulong, HALF))
+#else
 #define to_half_long(v) JOIN(convert_long, HALF)(v)
 #define to_half_ulong(v) JOIN(convert_ulong, HALF)(v)
+#endif
 #define as_half_ulong(v) JOIN(as_ulong, HALF)(v)
 typedef struct { HalfULong low, high; } ULong;
 static inline ULong ulong_zero(void) { ULong r = {(HalfULong)(0), (HalfULong)(0)}; return r; }

@@ -4,11 +4,16 @@
 
 typedef struct { UInt a, b, c, d; } UInt4Lanes;
 
-// The upper halves of 64-bit products. Lanes in pairs are 64-bit numbers: the product of the even one of each, then of the odd one,
-// each a single instruction (pmuludq) in registers of the lanes' own width.
+// The upper halves of 64-bit products.
 #if LANES == 1
 static inline UInt high_product(UInt x, uint m) { return (uint)(((ulong)x * m) >> 32); }
+#elif LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_convertvector)
+// AVX-512 widens and narrows lanes by an instruction; within a function no vector is too wide.
+static inline UInt high_product(UInt x, uint m) {
+    return __builtin_convertvector((__builtin_convertvector(x, ulong16) * (ulong)m) >> 32, UInt);
+}
 #else
+// Elsewhere lanes in pairs are taken for 64-bit numbers: the product of the even one of each, then of the odd one (pmuludq).
 static inline UInt high_product(UInt x, uint m) {
     HalfULong pairs = as_half_ulong(x), even = (pairs & 0xffffffffUL) * (ulong)m, odd = (pairs >> 32) * (ulong)m;
     return as_UInt((even >> 32) | (odd & 0xffffffff00000000UL));

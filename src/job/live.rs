@@ -195,6 +195,8 @@ impl Live {
             self.awaited = Some(Awaited::Field);
             return Ok(());
         }
+        // A budget of time is for the work, not for compiling.
+        self.started = Instant::now();
         let run = FieldRun::new(context, field, plan)?;
         self.job.lock().reasons = run.reasons().to_vec();
         self.field = Some(run);
@@ -208,6 +210,9 @@ impl Live {
         if !self.is_ready(context, &[plan.variant, of_cells, of_distances])? {
             self.awaited = Some(Awaited::View(volume));
             return Ok(());
+        }
+        if self.field.is_none() {
+            self.started = Instant::now();
         }
         let view = ViewRun::new(context, scene, &volume, plan)?;
         {

@@ -69,6 +69,23 @@ impl Server {
         Self::spawn_env(flags, environment).once_ready()
     }
 
+    /// Waits until nothing is left to compile, so that times are the renders' own.
+    pub fn once_compiled(self) -> Self {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+        let url = format!("{}/readyz", self.url);
+        let is_compiled = || -> bool {
+            let ready: serde_json::Value =
+                runtime.block_on(async { reqwest::get(&url).await.unwrap().json().await.unwrap() });
+            let kernels = &ready["kernels"];
+            let failed = kernels["failed"].as_array().map_or(0, Vec::len) as u64;
+            kernels["built"].as_u64().is_some_and(|built| Some(built + failed) == kernels["of"].as_u64())
+        };
+        while !is_compiled() {
+            std::thread::sleep(Duration::from_millis(100));
+        }
+        self
+    }
+
     /// A server that may not be ready yet.
     pub fn spawn(flags: &[&str]) -> Self {
         Self::spawn_env(flags, &[])
