@@ -19,7 +19,7 @@
 //! | [`scene`] | the validated scene: camera, transfer function, medium, lights, budget |
 //! | [`technique`] | the list of techniques; one file each, which makes plans as data |
 //! | [`volume`] | grids: readers, built-ins, the store |
-//! | [`job`] | queue, fair slices on the device thread, cancellation, the latest frame |
+//! | [`job`] | queue, fair slices on the device thread, kernels compiled beside it, cancellation, the latest frame |
 //! | [`plan`] | the planner: the cheapest setting that is accurate enough, or the best in a time, with reasons |
 //! | [`study`] | speed against accuracy: cases with a truth, measured |
 //! | [`device`] | the only home of OpenCL and of `unsafe`: context, programs, buffers |

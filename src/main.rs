@@ -258,7 +258,7 @@ async fn render_here(args: &RenderArgs, scene: &mut Value) -> Result<(Vec<u8>, V
                 return Ok((bytes, job.resource()));
             }
             (State::Failed | State::Cancelled, _) => {
-                return Err(Error::internal(job.resource()["failure"].to_string()));
+                return Err(job.failure().unwrap_or_else(|| Error::internal("the render was cancelled")));
             }
             _ => updates.changed().await.map_err(Error::internal)?,
         }

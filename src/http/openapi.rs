@@ -31,7 +31,7 @@ enum Body {
 }
 
 const JSON: &str = "application/json";
-const RENDER: &[u16] = &[400, 406, 408, 413, 415, 422, 429, 503];
+const RENDER: &[u16] = &[400, 406, 408, 413, 415, 422, 429, 501, 503];
 
 const fn get(
     path: &'static str,
@@ -68,7 +68,7 @@ const OPERATIONS: &[Operation] = &[
     get("/v1/renders", "The renders that are kept, newest first", &[(200, JSON, "A list of summaries")], &[]),
     get(
         "/v1/renders/{id}",
-        "State, plan, samples, error, timings, what stopped it, the convergence trace",
+        "State, plan, samples, error, timings, what stopped it, the convergence trace; waits_for names the kernel that a queued one waits for",
         &[(200, JSON, "The render resource")],
         &[404],
     ),
@@ -164,12 +164,21 @@ const OPERATIONS: &[Operation] = &[
         &[(200, JSON, "A list")],
         &[],
     ),
-    get("/v1/device", "The OpenCL device in use, its limits and its lanes", &[(200, JSON, "The device")], &[503]),
+    get(
+        "/v1/device",
+        "The OpenCL device in use: its limits, level and lanes, what was given up, and how far its kernels are",
+        &[(200, JSON, "The device")],
+        &[503],
+    ),
     get("/healthz", "The process lives", &[(200, JSON, "It does")], &[]),
     get(
         "/readyz",
-        "Kernels are built, there is room in the queue, the server is not draining",
-        &[(200, JSON, "Ready")],
+        "The first picture can be rendered, there is room in the queue, the server is not draining",
+        &[(
+            200,
+            JSON,
+            "Ready: how far the kernels are, those that do not build, the level, the lanes, what was given up",
+        )],
         &[503],
     ),
     get("/metrics", "Prometheus metrics", &[(200, "text/plain", "Metrics")], &[]),

@@ -117,13 +117,16 @@ pub async fn finish(planner: &Planner<'_>, request: Value, region: Region, field
 /// Runs a scene to its end, unseen; where that is not waited for any more, it is cancelled.
 ///
 /// # Errors
-/// [`Error::Internal`] where it fails.
+/// [`Error::Kernel`] where its kernel does not build, [`Error::Internal`] where it fails otherwise.
 pub async fn to_its_end(planner: &Planner<'_>, request: Value, scene: Scene) -> Result<Arc<Job>> {
     let job = CancelOnDrop { engine: planner.engine, job: planner.engine.submit_pilot(request, scene) };
     job.job.watch().wait_for(|u| u.state.is_terminal()).await.map(drop).map_err(Error::internal)?;
     match job.job.state() {
         State::Done => Ok(job.job.clone()),
-        _ => Err(Error::internal(format!("a pilot failed: {}", job.job.resource()["failure"]))),
+        _ => match job.job.failure() {
+            Some(unavailable @ Error::Kernel { .. }) => Err(unavailable),
+            other => Err(Error::internal(format!("a pilot failed: {other:?}"))),
+        },
     }
 }
 

@@ -114,10 +114,10 @@ fn device_lists_the_variants_of_every_kernel() {
     assert_eq!(told["count"].as_u64(), Some(variants.len() as u64));
     for kernel in ["emission_absorption", "volume_path", "photon_transport", "isosurface"] {
         let of: Vec<&Value> = variants.iter().filter(|v| v["kernel"] == kernel).collect();
-        assert!(
-            of.iter().any(|v| v["at_start"] == true) && of[0]["options"].as_str().unwrap().contains("-Werror"),
-            "{kernel}"
-        );
+        let options = of[0]["options"].as_str().unwrap();
+        // In service a compiler's warning takes nothing away.
+        assert!(options.contains("-DLANES=") && !options.contains("-Werror"), "{kernel}: {options}");
+        assert!(of.iter().any(|v| v["at_start"] == true), "{kernel}");
     }
     assert!(
         variants.iter().any(|v| v["features"]["SHADED"] == 1) && variants.iter().any(|v| v["features"]["SHADED"] == 0)
