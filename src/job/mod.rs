@@ -20,6 +20,7 @@ mod places;
 mod report;
 mod resource;
 mod rounds;
+mod snapshot;
 mod tiling;
 mod verdict;
 mod view_run;
@@ -43,47 +44,10 @@ pub use engine::{Engine, Place, Readiness};
 pub use field_run::PICTURES_ON_THE_WAY;
 pub use kernels::KernelProgress;
 pub use report::{Counts, Frame, State, Timings, TracePoint, Update};
+pub(crate) use snapshot::{SampleCounts, Snapshot};
 
 /// Points of the convergence trace that are kept; past this, every second one is dropped.
 const TRACE_POINTS: usize = 512;
-
-/// What the device thread hands to the developer of a job's frames.
-pub(crate) struct Snapshot {
-    pub film: Arc<Film>,
-    pub generation: u64,
-    pub elapsed_ms: f64,
-    pub device_ms: f64,
-    pub counts: SampleCounts,
-    pub result: Option<Value>,
-    /// What stopped the render, on the final snapshot.
-    pub stopped_by: Option<&'static str>,
-}
-
-/// What the kernels count among a picture's samples, in their order (`kernels/shared/film.h`, `kernels/shared/flight.h`).
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct SampleCounts {
-    pub non_finite: u32,
-    pub fireflies: u32,
-    pub clamped: u32,
-    pub broken: u32,
-    /// Sum of luminance.
-    pub clamped_luminance: f64,
-    pub cut: u32,
-}
-
-impl SampleCounts {
-    /// What a job says of them.
-    fn report(&self, film: &Film, counts: &mut Counts) {
-        counts.non_finite_samples = self.non_finite.into();
-        counts.non_finite_pixels = film.main.unknown_pixels() as u64;
-        counts.fireflies = self.fireflies.into();
-        counts.clamped_samples = self.clamped.into();
-        let cut = self.clamped_luminance;
-        counts.clamped_energy = if cut > 0.0 { cut / (film.luminance_sum() + cut) } else { 0.0 };
-        counts.broken_majorants = self.broken.into();
-        counts.cut_paths = self.cut.into();
-    }
-}
 
 /// What a new camera means for the engine.
 pub(crate) struct Restart {
