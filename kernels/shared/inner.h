@@ -163,7 +163,7 @@ static inline Real3 inner_slopes(constant const View *view, VOLUME voxels, Inner
     #define SLOPE(y, z, v) to_real(weigh(gather_words(from + ((y) * row + (z) * sheet + 2), at), 0, all) - weigh(gather_words(from + ((y) * row + (z) * sheet - 2), at), 0, all))
 #endif
     #define ROW(y, z) gather_words(from + ((y) * row + (z) * sheet), at)
-    #define LINE(v) to_real(weigh(v, LINE_PLACE, all))
+    #define LINE(v) WHOLE(weigh(v, LINE_PLACE, all))
     #define LERP(a, b, f) mad((b) - (a), f, a)
     Int va = ROW(0, 0), vb = ROW(1, 0), vc = ROW(0, 1), vd = ROW(1, 1);
     Real3 gradient;
