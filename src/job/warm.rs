@@ -45,18 +45,25 @@ pub(super) fn is_cached(device: &Device, variant: &Variant) -> bool {
     note(device, variant).is_some_and(|note| note.exists())
 }
 
-/// Builds what the first picture needs. Where there is a compiler its process goes first: what LLVM cannot compile ends that one.
+/// Builds what the first picture needs. Where there is a compiler its processes go first, two at a time: what LLVM cannot compile ends
+/// those.
 ///
 /// # Errors
 /// [`Error::Internal`] with the compiler's words.
 pub(super) fn first_kernels(device: &mut Device, compiler: Option<&Compiler>) -> Result<()> {
-    let mut process = None;
-    for variant in kernels::first() {
-        if let Some(compiler) = compiler.filter(|_| device.info().is_pocl() && !is_cached(device, &variant)) {
-            let compiled = compiler.compile(&mut process, &variant);
-            compiled.map_err(|words| Error::internal(format!("{}: {words}", variant.label())))?;
-        }
-        warm(device, &variant)?;
+    let first = kernels::first();
+    if let Some(compiler) = compiler.filter(|_| device.info().is_pocl()) {
+        let missing: Vec<Variant> = first.iter().filter(|v| !is_cached(device, v)).copied().collect();
+        let compile = |part: &[Variant]| {
+            let mut process = None;
+            part.iter().try_for_each(|variant| {
+                let compiled = compiler.compile(&mut process, variant);
+                compiled.map_err(|words| Error::internal(format!("{}: {words}", variant.label())))
+            })
+        };
+        let (one, other) = missing.split_at(missing.len() / 2);
+        let (one, other) = rayon::join(|| compile(one), || compile(other));
+        one.and(other)?;
     }
-    Ok(())
+    first.iter().try_for_each(|variant| warm(device, variant))
 }
