@@ -19,6 +19,7 @@ use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::film::picture::Background;
 use crate::scene::{Scene, Subject};
+use crate::technique::{FieldPlan, ViewPlan};
 use crate::volume::Volume;
 
 /// A turn on the device: long enough to be worth a launch, short enough that nobody waits and a cancel is felt at once.
@@ -38,10 +39,10 @@ pub(super) enum Turn {
     Over,
 }
 
-/// What cannot begin before its kernel is compiled.
+/// What cannot begin before its kernel is compiled: planned once, since a field's plan may take long.
 enum Awaited {
-    Field,
-    View(Arc<Volume>),
+    Field(FieldPlan),
+    View(Arc<Volume>, ViewPlan),
 }
 
 /// A job with its buffers.
@@ -104,8 +105,8 @@ impl Live {
         }
         match self.awaited.take() {
             None => self.follow_camera(context)?,
-            Some(Awaited::Field) => self.begin_field(context)?,
-            Some(Awaited::View(volume)) => self.begin_view(context, volume)?,
+            Some(Awaited::Field(plan)) => self.run_field(context, plan)?,
+            Some(Awaited::View(volume, plan)) => self.run_view(context, volume, plan)?,
         }
         if self.awaited.is_some() {
             return Ok(Turn::Waits);
@@ -191,10 +192,15 @@ impl Live {
     fn begin_field(&mut self, context: &mut DeviceContext) -> Result<()> {
         let Some(Subject::Field(field)) = self.scene.as_ref().map(Scene::subject) else { return Ok(()) };
         let plan = field.plan()?;
+        self.run_field(context, plan)
+    }
+
+    fn run_field(&mut self, context: &mut DeviceContext, plan: FieldPlan) -> Result<()> {
         if !self.is_ready(context, &[plan.variant])? {
-            self.awaited = Some(Awaited::Field);
+            self.awaited = Some(Awaited::Field(plan));
             return Ok(());
         }
+        let Some(Subject::Field(field)) = self.scene.as_ref().map(Scene::subject) else { return Ok(()) };
         // A budget of time is for the work, not for compiling.
         self.started = Instant::now();
         let run = FieldRun::new(context, field, plan)?;
@@ -206,11 +212,16 @@ impl Live {
     fn begin_view(&mut self, context: &mut DeviceContext, volume: Arc<Volume>) -> Result<()> {
         let Some(scene) = &self.scene else { return Ok(()) };
         let plan = scene.view().plan(&volume)?;
+        self.run_view(context, volume, plan)
+    }
+
+    fn run_view(&mut self, context: &mut DeviceContext, volume: Arc<Volume>, plan: ViewPlan) -> Result<()> {
         let [of_cells, of_distances] = cells::needed(volume.voxel_type());
         if !self.is_ready(context, &[plan.variant, of_cells, of_distances])? {
-            self.awaited = Some(Awaited::View(volume));
+            self.awaited = Some(Awaited::View(volume, plan));
             return Ok(());
         }
+        let Some(scene) = &self.scene else { return Ok(()) };
         if self.field.is_none() {
             self.started = Instant::now();
         }
