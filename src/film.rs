@@ -1,11 +1,11 @@
-//! The film on the host: what a view has gathered so far, its estimated error, and the picture of it.
+//! The film on the host: what a view has gathered so far, its estimated error, and what is read of its pixels.
 
 pub mod difference;
 mod estimate;
 mod lowered;
 pub mod picture;
 mod rounds;
-mod srgb;
+pub mod srgb;
 mod sums;
 
 use std::sync::Arc;
@@ -13,8 +13,8 @@ use std::sync::Arc;
 pub use estimate::ErrorEstimate;
 pub use lowered::Lowered;
 use picture::Background;
-use rayon::prelude::*;
 pub(crate) use rounds::{Halves, Round, SURE, is_round, pilot_rounds};
+pub use sums::{Apart, Sums};
 
 /// Means and squared deviations of one set of samples, as the device leaves them (`kernels/shared/film.h`).
 #[derive(Debug, Clone, Default)]
@@ -27,9 +27,9 @@ pub struct Samples {
     pub stride: usize,
     /// Samples per pixel.
     pub count: u32,
-    /// Mean linear R, G, B and alpha of every pixel.
+    /// Mean linear R, G, B and alpha of every pixel. Empty where it was not read.
     pub mean: Vec<f32>,
-    /// Sum of squared deviations of the luminance of every pixel; NaN where a sample was not finite. Empty where it was not read: of one
+    /// Sum of squared deviations of the luminance of every pixel; NaN where a sample was not finite. Empty where it was not read, as of one
     /// sample that was finite everywhere.
     pub m2: Vec<f32>,
     /// Samples by tile, where they were put where the error is.
@@ -59,24 +59,7 @@ fn luminance(p: &[f32]) -> f64 {
     0.2126 * f64::from(p[0]) + 0.7152 * f64::from(p[1]) + 0.0722 * f64::from(p[2])
 }
 
-/// Pixels of a film that a core takes at a time.
-const PART: usize = 1 << 14;
-
 impl Samples {
-    /// The sum over the pixels of a function of red, green, blue and alpha; the same to the last bit for any number of cores.
-    fn sum(&self, of: impl Fn(&[f32]) -> f64 + Sync) -> f64 {
-        let part = |part: &[f32]| {
-            // Sums of their own for every eighth pixel, so that eight are worked out side by side.
-            let (mut sums, eights) = ([0.0; 8], part.chunks_exact(32));
-            let rest: f64 = eights.remainder().chunks_exact(4).map(&of).sum();
-            for eight in eights {
-                sums.iter_mut().zip(eight.chunks_exact(4)).for_each(|(sum, pixel)| *sum += of(pixel));
-            }
-            sums.iter().sum::<f64>() + rest
-        };
-        self.mean.par_chunks(4 * PART).map(part).collect::<Vec<f64>>().iter().sum()
-    }
-
     /// Linear luminance of a pixel.
     pub fn luminance(&self, pixel: usize) -> f64 {
         luminance(&self.mean[4 * pixel..])
@@ -127,15 +110,6 @@ impl Samples {
         }
         sums.iter().zip(pixels).map(|(s, n): (&f64, f64)| (s / n.max(1.0)).sqrt()).collect()
     }
-
-    /// Pixels of which a sample was not finite.
-    pub fn unknown_pixels(&self) -> usize {
-        self.m2.par_chunks(PART).map(|part| part.iter().filter(|v| !v.is_finite()).count()).sum()
-    }
-
-    fn mean_luminance(&self) -> f64 {
-        self.sum(luminance) / self.pixels().max(1) as f64
-    }
 }
 
 /// What a view has gathered: its samples, and those of a control at twice the step on every second pixel.
@@ -143,8 +117,10 @@ impl Samples {
 pub struct Film {
     /// Size of the picture asked for.
     pub size: [usize; 2],
-    /// The samples; `stride` is 1 but for a preview.
+    /// The samples; `stride` is 1 but for a preview. The pixels themselves are there where somebody asked for them.
     pub main: Samples,
+    /// What its error is made of.
+    pub sums: Sums,
     /// The control, if there is one yet.
     pub control: Option<Samples>,
     /// Whether a sample of the control is that of the same number of the others but for its step: nothing random is in them.
@@ -170,7 +146,7 @@ pub struct Film {
 }
 
 impl Film {
-    /// Relative root-mean-square difference in luminance to another film of the same size.
+    /// Relative root-mean-square difference in luminance to another film of the same size, where both have their pixels.
     pub fn difference(&self, other: &Film) -> Option<f64> {
         if self.main.mean.len() != other.main.mean.len() || self.main.stride != other.main.stride {
             return None;
@@ -178,24 +154,23 @@ impl Film {
         let squared: f64 =
             (0..self.main.pixels()).map(|i| (self.main.luminance(i) - other.main.luminance(i)).powi(2)).sum();
         let rms = (squared / self.main.pixels().max(1) as f64).sqrt();
-        let mean = self.main.mean_luminance();
-        Some(if mean > 0.0 { rms / mean } else { rms })
+        Some(self.relative(rms))
+    }
+
+    /// By the mean luminance, where that is above 0.
+    fn relative(&self, absolute: f64) -> f64 {
+        let mean = self.sums.luminance / self.main.pixels().max(1) as f64;
+        if mean > 0.0 { absolute / mean } else { absolute }
     }
 
     /// What half the resolution would lose, relative.
     pub fn resolution_loss(&self) -> f64 {
-        let (mean, loss) = (self.main.mean_luminance(), self.main.resolution_error());
-        if mean > 0.0 { loss / mean } else { loss }
+        self.relative(self.sums.of_blocks())
     }
 
-    /// The luminance of all samples together.
-    pub fn luminance_sum(&self) -> f64 {
-        (0..self.main.pixels()).map(|i| self.main.luminance(i) * f64::from(self.main.count_at(i))).sum()
-    }
-
-    /// Bytes held.
+    /// Bytes of the film on the device.
     pub fn bytes(&self) -> usize {
-        let held = |s: &Samples| 4 * (s.mean.len() + s.m2.len());
+        let held = |s: &Samples| 20 * s.pixels();
         held(&self.main) + self.control.as_ref().map_or(0, held)
     }
 }

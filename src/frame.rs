@@ -3,12 +3,11 @@
 mod stripes;
 
 use std::borrow::Cow;
-use std::ops::Range;
 
 use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage};
 
 use crate::error::{Error, Result};
-pub(crate) use stripes::{Deflated, rows, stripes};
+use stripes::Deflated;
 
 /// 8-bit sRGB, three or four bytes a pixel, as PNG, by a fast encoder: a frame is looked at once. `description` goes into its text chunk,
 /// under the keyword `Cloudchamber`.
@@ -17,9 +16,7 @@ pub(crate) use stripes::{Deflated, rows, stripes};
 /// [`Error::Internal`] when the encoder fails.
 pub fn png(size: [usize; 2], picture: &[u8], description: String) -> Result<Vec<u8>> {
     let channels = if picture.len() == 4 * size[0] * size[1] { 4 } else { 3 };
-    let row = size[0] * channels;
-    let copy = |rows: Range<usize>, out: &mut [u8]| out.copy_from_slice(&picture[rows.start * row..rows.end * row]);
-    Deflated::new(size, channels, copy)?.0.png(description)
+    Deflated::new(size, channels, picture)?.png(description)
 }
 
 /// Linear RGB, or RGB and alpha, in 32-bit floats as OpenEXR, with a channel `standard_error` of the luminance where it is given;

@@ -253,8 +253,7 @@ async fn render_here(args: &RenderArgs, scene: &mut Value) -> Result<(Vec<u8>, V
             (State::Done, Some(last)) => {
                 bar.finish();
                 let exr = args.wants_exr();
-                let film = || job.film().ok_or_else(|| Error::internal("the film is gone"));
-                let bytes = if exr { film().and_then(|(film, error)| film.exr(&error))? } else { last.png.to_vec() };
+                let bytes = if exr { engine.film(&job).await?.exr()? } else { last.png.to_vec() };
                 return Ok((bytes, job.resource()));
             }
             (State::Failed | State::Cancelled, _) => {

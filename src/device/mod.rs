@@ -3,6 +3,7 @@
 //! A [`Device`] lives on the thread that opened it (the job engine's), so that everything else stays free of OpenCL.
 
 pub mod cells;
+pub mod develop;
 mod images;
 mod level;
 pub mod program;
@@ -208,6 +209,15 @@ impl Device {
         // SAFETY: no host pointer is given, so there is no memory of ours whose validity matters.
         let memory = unsafe { ClBuffer::create(&self.context, CL_MEM_READ_WRITE, bytes, ptr::null_mut()) };
         Ok(Buffer { memory: Memory::Bytes(cl("allocating a buffer", memory)?), bytes })
+    }
+
+    /// A buffer of `bytes` bytes, of what was written before or not at all: `room` where that is as large. Memory that has been in use is there
+    /// at once; of new memory the system hands out every page when it is first touched.
+    ///
+    /// # Errors
+    /// As [`Device::allocate`].
+    pub fn allocate_in(&self, room: Option<Buffer>, bytes: usize) -> Result<Buffer> {
+        room.filter(|room| room.bytes == bytes).map_or_else(|| self.allocate(bytes), Ok)
     }
 
     /// A buffer that holds `data` and `padding` zero bytes behind it.

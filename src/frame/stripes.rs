@@ -4,8 +4,6 @@
 //! block behind it brings the next to a byte's boundary. A stripe's first row is filtered without the row above, so that stripes
 //! need nothing of each other.
 
-use std::ops::Range;
-
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
@@ -21,16 +19,10 @@ const PAETH: u8 = 4;
 const ZLIB_HEADER: usize = 2;
 const CHECKSUM: usize = 4;
 
-/// Rows of a stripe, by the picture's size alone; an even number, so that 2 × 2 pixels are never parted.
-pub fn rows([width, height]: [usize; 2]) -> usize {
+/// Rows of a stripe, by the picture's size alone.
+fn rows([width, height]: [usize; 2]) -> usize {
     let pixels = (width * height).div_ceil(MOST_STRIPES).max(LEAST_PIXELS);
-    pixels.div_ceil(width.max(1)).next_multiple_of(2)
-}
-
-/// The stripes of a picture from the top: their rows.
-pub fn stripes([width, height]: [usize; 2]) -> impl IndexedParallelIterator<Item = Range<usize>> {
-    let rows = rows([width, height]);
-    (0..height.div_ceil(rows)).into_par_iter().map(move |i| i * rows..((i + 1) * rows).min(height))
+    pixels.div_ceil(width.max(1))
 }
 
 /// A deflated picture of 8-bit sRGB.
@@ -50,26 +42,18 @@ struct Stripe {
 }
 
 impl Deflated {
-    /// Deflates a picture of three or four `channels`: `fill` writes the pixels of some rows and may return something of them,
-    /// which comes back in order. The bytes do not depend on the number of threads.
+    /// Deflates a picture of three or four `channels`, row by row. The bytes do not depend on the number of threads.
     ///
     /// # Errors
     /// [`Error::Internal`] when the encoder fails.
-    pub fn new<T: Send>(
-        size: [usize; 2],
-        channels: usize,
-        fill: impl Fn(Range<usize>, &mut [u8]) -> T + Sync,
-    ) -> Result<(Self, Vec<T>)> {
+    pub fn new(size: [usize; 2], channels: usize, picture: &[u8]) -> Result<Self> {
         let row = size[0] * channels;
-        let of = |pixels: &mut Vec<u8>, rows: Range<usize>| {
-            pixels.resize(rows.len() * row, 0);
-            let told = fill(rows.clone(), pixels);
-            let place = Place { first: rows.start == 0, last: rows.end == size[1] };
-            deflate(pixels, row, channels, place).map(|stripe| (stripe, told))
-        };
-        let both: Vec<_> = stripes(size).map_init(Vec::new, of).collect::<Result<_>>()?;
-        let (stripes, told) = both.into_iter().unzip();
-        Ok((Self { size, channels, stripes }, told))
+        let stripe = rows(size) * row;
+        let count = picture.len().div_ceil(stripe.max(1));
+        let of =
+            |(i, pixels): (usize, &[u8])| deflate(pixels, row, channels, Place { first: i == 0, last: i + 1 == count });
+        let stripes = picture.par_chunks(stripe.max(1)).enumerate().map(of).collect::<Result<_>>()?;
+        Ok(Self { size, channels, stripes })
     }
 
     /// The PNG, with `description` in a text chunk under the keyword `Cloudchamber`.

@@ -106,9 +106,12 @@ impl Drop for CancelOnDrop {
 async fn finished(app: &App, job: Arc<Job>, fresh: bool, format: &str) -> Result<Response> {
     let mut guard = CancelOnDrop::new(app, &job, fresh);
     let _permit = app.stream_permit()?;
+    if fresh {
+        job.set_followed(false);
+    }
     let frame = wait_for(app, &job, true).await?;
     guard.armed = false;
-    if format == "image/png" { Ok(png_response(&frame)) } else { exr_response(job, &frame).await }
+    if format == "image/png" { Ok(png_response(&frame)) } else { exr_response(app, &job, &frame).await }
 }
 
 /// The newest frame; the final one if `last`, else the first that there is.
@@ -161,12 +164,13 @@ fn png_response(frame: &Frame) -> Response {
     with_frame_headers(([(header::CONTENT_TYPE, "image/png")], frame.png.clone()).into_response(), frame, &frame.etag)
 }
 
-async fn exr_response(job: Arc<Job>, frame: &Frame) -> Result<Response> {
-    let (film, error) =
-        job.film().ok_or_else(|| Error::NotFound { what: "film any more of render", id: job.id().into() })?;
-    let bytes = tokio::task::spawn_blocking(move || film.exr(&error)).await.map_err(Error::internal)??;
+/// The film as it is by now: that of a running render may have more samples than its newest frame.
+async fn exr_response(app: &App, job: &Arc<Job>, frame: &Frame) -> Result<Response> {
+    let film = app.engine.film(job).await?;
+    let frame = Frame { samples: film.main.count, error: film.error(), lowered: film.lowered, ..frame.clone() };
+    let bytes = tokio::task::spawn_blocking(move || film.exr()).await.map_err(Error::internal)??;
     let etag = frame::etag(&bytes);
-    Ok(with_frame_headers(([(header::CONTENT_TYPE, "image/x-exr")], bytes).into_response(), frame, &etag))
+    Ok(with_frame_headers(([(header::CONTENT_TYPE, "image/x-exr")], bytes).into_response(), &frame, &etag))
 }
 
 pub(super) fn find(app: &App, id: &str) -> Result<Arc<Job>> {
@@ -228,6 +232,9 @@ async fn newest((State(app), Id(id), query, _): &FrameRequest) -> Result<(Arc<Jo
     let job = find(app, id)?;
     let last = query.as_ref().map_err(|e| Error::Malformed(e.body_text()))?.last()?;
     let _permit = app.stream_permit()?;
+    if !last {
+        job.set_followed(true);
+    }
     let frame = wait_for(app, &job, last).await?;
     Ok((job, frame))
 }
@@ -244,7 +251,7 @@ pub(super) async fn frame_png(request: FrameRequest) -> Result<Response> {
 /// `GET /v1/renders/{id}/frame.exr`.
 pub(super) async fn frame_exr(request: FrameRequest) -> Result<Response> {
     let (job, frame) = newest(&request).await?;
-    let response = exr_response(job, &frame).await?;
+    let response = exr_response(&request.0, &job, &frame).await?;
     let etag = response.headers().get(header::ETAG).and_then(|v| v.to_str().ok()).unwrap_or_default().to_owned();
     if unchanged(&request.3, &etag) {
         return Ok(with_frame_headers(StatusCode::NOT_MODIFIED.into_response(), &frame, &etag));
@@ -269,13 +276,8 @@ pub(super) async fn difference(
     let Ok(Query(DifferenceQuery { with })) = query else {
         return Err(Error::invalid("query:with", "missing", "the id of another render"));
     };
-    let film = |id: &str| -> Result<_> {
-        let job = find(&app, id)?;
-        let film =
-            job.film().ok_or_else(|| Error::NotFound { what: "film (any more) of render", id: job.id().into() })?;
-        Ok(film.0)
-    };
-    let (ours, theirs) = (film(&id)?, film(&with)?);
+    let (one, other) = (find(&app, &id)?, find(&app, &with)?);
+    let (ours, theirs) = (app.engine.film(&one).await?, app.engine.film(&other).await?);
     let compared = tokio::task::spawn_blocking(move || -> Result<_> {
         let difference = ours.compare(&theirs)?;
         let png = difference.png()?;

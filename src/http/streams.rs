@@ -35,6 +35,7 @@ struct Reader {
 impl Reader {
     fn new(app: &App, job: Arc<Job>, shown: u64, guard: Option<CancelOnDrop>) -> Result<Self> {
         let _permit = app.stream_permit()?;
+        job.set_followed(true);
         metrics::counter!("cloudchamber_streams_total").increment(1);
         Ok(Self { updates: job.watch(), job, stop: app.stop.clone(), shown, over: false, _permit, _guard: guard })
     }

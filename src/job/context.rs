@@ -11,7 +11,7 @@ use super::kernels::{self, Kernels};
 use super::warm::{first_kernels, is_cached, warm};
 use crate::device::cells::Cells;
 use crate::device::program::Variant;
-use crate::device::{Buffer, Device, DeviceConfig};
+use crate::device::{Buffer, Device, DeviceConfig, develop};
 use crate::error::{Error, Result};
 use crate::volume::Volume;
 
@@ -23,7 +23,7 @@ pub(super) struct DeviceVolume {
     pub voxels: Buffer,
     pub cells: Cells,
     /// Distances to what views wanted to see of it, newest last: a client that turns a volume asks the same again and again.
-    distances: RefCell<Vec<(DistancesKey, Rc<Buffer>)>>,
+    distances: RefCell<Vec<(DistancesKey, Distances)>>,
 }
 
 /// Intervals of raw values and the overshoot, as bits.
@@ -38,13 +38,16 @@ impl DeviceVolume {
     }
 
     /// How far each cell is from a value in `intervals`: [`Cells::distances`].
-    pub fn distances(&self, device: &mut Device, intervals: &[[f32; 2]], overshoot: f32) -> Result<Rc<Buffer>> {
+    pub fn distances(&self, device: &mut Device, intervals: &[[f32; 2]], overshoot: f32) -> Result<Distances> {
         let key = (intervals.iter().map(|ends| ends.map(f32::to_bits)).collect(), overshoot.to_bits());
         let mut kept = self.distances.borrow_mut();
         if let Some((_, distances)) = kept.iter().find(|(other, _)| *other == key) {
             return Ok(distances.clone());
         }
-        let distances = Rc::new(self.cells.distances(device, intervals, overshoot)?);
+        let buffer = self.cells.distances(device, intervals, overshoot)?;
+        let mut bytes = vec![0u8; self.cells.dims().iter().product()];
+        device.read(&buffer, 0, &mut bytes)?;
+        let distances = Distances { buffer: Rc::new(buffer), empty: bytes.iter().filter(|d| **d > 0).count() };
         if kept.len() == KEPT_DISTANCES {
             kept.remove(0);
         }
@@ -53,9 +56,18 @@ impl DeviceVolume {
     }
 }
 
+/// Distances, and how many cells are empty.
+#[derive(Clone)]
+pub(super) struct Distances {
+    pub buffer: Rc<Buffer>,
+    pub empty: usize,
+}
+
 /// Everything on the device that outlives a job.
 pub(super) struct DeviceContext {
     pub device: Device,
+    /// That films are developed by.
+    pub curve: Rc<Buffer>,
     volumes: HashMap<usize, (Weak<Volume>, Rc<DeviceVolume>)>,
     /// Rays a millisecond of the last pass, by kernel variant.
     speed: HashMap<Variant, f64>,
@@ -89,7 +101,8 @@ impl DeviceContext {
                     tracing::info!(ms, lanes = used, level, "the first kernels are there");
                     device.note_given_up(gave_up);
                     let (volumes, speed) = (HashMap::new(), HashMap::new());
-                    let mut context = Self { device, volumes, speed, kernels, compiles_ahead: false };
+                    let curve = develop::curve(&device)?;
+                    let mut context = Self { device, curve, volumes, speed, kernels, compiles_ahead: false };
                     context.compile_ahead(config, wake)?;
                     return Ok(context);
                 }

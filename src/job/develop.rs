@@ -1,4 +1,4 @@
-//! Develops a job's snapshots into frames: error, tone and PNG, on the runtime's blocking threads, newest first.
+//! Makes frames of a job's snapshots, whose pictures the device has developed: error and PNG, on the runtime's blocking threads, newest first.
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Weak};
@@ -32,13 +32,18 @@ pub(super) async fn frames(job: Weak<Job>, engine: Engine) {
         developed_last = Arc::downgrade(&snapshot);
         let developed = tokio::task::spawn_blocking({
             let snapshot = snapshot.clone();
-            move || snapshot.film.png()
+            move || snapshot.film.png(&snapshot.picture)
         })
         .await;
         job.developing.store(false, Ordering::Release);
+        job.snapshots.send_if_modified(|newest| {
+            // Its picture is not needed any more.
+            newest.take_if(|newest| Arc::ptr_eq(newest, &snapshot));
+            false
+        });
         match developed {
-            Ok(Ok((png, error, clipped))) => {
-                if job.publish(&snapshot, png, error, clipped) {
+            Ok(Ok((png, error))) => {
+                if job.publish(&snapshot, png, error) {
                     engine.ended(&job);
                 }
             }

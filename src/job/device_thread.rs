@@ -2,23 +2,27 @@
 
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender};
+use std::sync::{Arc, Weak};
 
-use tokio::sync::watch;
+use tokio::sync::{oneshot, watch};
 
 use super::Job;
 use super::context::DeviceContext;
 use super::engine::Readiness;
+use super::gathered::Gathered;
 use super::kernels::Kernels;
 use super::live::{Live, Turn};
 use crate::device::{DeviceConfig, NO_DEVICE};
-use crate::error::Error;
+use crate::error::{Error, Result};
+use crate::film::Film;
 
 /// What the device thread is told.
 pub(super) enum Command {
     /// A render to run.
     Run(Arc<Job>),
+    /// Somebody wants to see a render's film.
+    Film(Arc<Job>, oneshot::Sender<Result<Film>>),
     /// A kernel has been compiled, or cannot be.
     Kernel,
     /// Nobody is left to ask for anything.
@@ -32,6 +36,8 @@ pub(super) struct DeviceThread {
     /// To itself, for those who compile its kernels.
     pub commands: Sender<Command>,
     pub most_live: usize,
+    /// Bytes of films of ended renders that are kept.
+    pub keep_film_bytes: usize,
 }
 
 /// The renders on the device thread.
@@ -41,6 +47,10 @@ struct Renders {
     live: VecDeque<Live>,
     /// Those that wait for a kernel.
     parked: VecDeque<Live>,
+    /// What ended ones have gathered, the newest last.
+    rested: Vec<(Weak<Job>, Gathered)>,
+    /// Who wants to see a film.
+    asked: Vec<(Arc<Job>, oneshot::Sender<Result<Film>>)>,
 }
 
 impl DeviceThread {
@@ -58,7 +68,7 @@ impl DeviceThread {
                 loop {
                     match incoming.recv() {
                         Ok(Command::Run(job)) => drop(job.fail(&Error::Unavailable(NO_DEVICE.into()))),
-                        Ok(Command::Kernel) => {}
+                        Ok(Command::Kernel | Command::Film(..)) => {}
                         Ok(Command::Stop) | Err(_) => return,
                     }
                 }
@@ -68,6 +78,7 @@ impl DeviceThread {
         let mut renders = Renders::default();
         loop {
             if renders.live.is_empty() && renders.waiting.is_empty() {
+                renders.forget();
                 context.tidy();
                 if !context.build_ahead() {
                     match incoming.recv() {
@@ -82,7 +93,8 @@ impl DeviceThread {
                 }
                 renders.told(command);
             }
-            renders.turn(&mut context, self.most_live);
+            renders.turn(&mut context, self.most_live, self.keep_film_bytes);
+            renders.show(&context);
         }
     }
 }
@@ -91,17 +103,19 @@ impl Renders {
     fn told(&mut self, command: Command) {
         match command {
             Command::Run(job) => self.waiting.push_back(job),
+            Command::Film(job, to) => self.asked.push((job, to)),
             Command::Kernel => self.live.append(&mut self.parked),
             Command::Stop => {}
         }
     }
 
     /// A turn of the next.
-    fn turn(&mut self, context: &mut DeviceContext, most_live: usize) {
+    fn turn(&mut self, context: &mut DeviceContext, most_live: usize, keep_film_bytes: usize) {
         self.waiting.retain(|job| !job.state().is_terminal());
         while self.live.len() < most_live {
             let Some(job) = self.waiting.pop_front() else { break };
-            self.live.push_back(Live::new(job));
+            let memory = self.memory_for(&job, keep_film_bytes);
+            self.live.push_back(Live::new(job, memory));
         }
         metrics::gauge!("cloudchamber_renders_live").set(self.live.len() as f64);
         metrics::gauge!("cloudchamber_renders_waiting").set((self.waiting.len() + self.parked.len()) as f64);
@@ -110,9 +124,59 @@ impl Renders {
         match catch_unwind(AssertUnwindSafe(|| current.turn(context))) {
             Ok(Ok(Turn::Again)) => self.live.push_back(current),
             Ok(Ok(Turn::Waits)) => self.parked.push_back(current),
-            Ok(Ok(Turn::Over)) => {}
+            Ok(Ok(Turn::Over)) => self.rest(current, keep_film_bytes),
             Ok(Err(error)) => current.fail(error),
             Err(_) => current.fail(Error::internal("a panic on the device thread")),
+        }
+    }
+    /// What a render is to gather in: what it gathered before, or what the oldest did where that would be let go of for it.
+    fn memory_for(&mut self, job: &Arc<Job>, keep_film_bytes: usize) -> Option<Gathered> {
+        let own = self.rested.iter().position(|(of, _)| std::ptr::eq(of.as_ptr(), &**job));
+        let bytes: usize = self.rested.iter().map(|(_, gathered)| gathered.bytes()).sum();
+        let newest = self.rested.last().map_or(0, |(_, gathered)| gathered.bytes());
+        let oldest = (self.rested.len() > 1 && bytes + newest > keep_film_bytes).then_some(0);
+        own.or(oldest).map(|at| self.rested.remove(at).1)
+    }
+
+    /// Keeps what an ended render has gathered, and lets go of the oldest past the limit; not of the newest, however large, for whoever waits
+    /// for it.
+    fn rest(&mut self, ended: Live, keep_film_bytes: usize) {
+        self.forget();
+        self.rested.extend(ended.rest());
+        let mut bytes = 0;
+        let mut kept = 0;
+        for (_, gathered) in self.rested.iter().rev() {
+            bytes += gathered.bytes();
+            if kept > 0 && bytes > keep_film_bytes {
+                break;
+            }
+            kept += 1;
+        }
+        self.rested.drain(..self.rested.len() - kept);
+    }
+
+    /// Lets go of what nobody can ask for any more.
+    fn forget(&mut self) {
+        self.rested.retain(|(job, _)| job.strong_count() > 0);
+    }
+
+    /// Shows films to who asked: at once where there is something to see, else once there is; not where the render has left nothing.
+    fn show(&mut self, context: &DeviceContext) {
+        for (job, to) in std::mem::take(&mut self.asked) {
+            let mut live = self.live.iter_mut().chain(&mut self.parked).filter(|live| live.is_of(&job));
+            let rested = self.rested.iter_mut().find(|(of, _)| std::ptr::eq(of.as_ptr(), &*job));
+            let waits = self.waiting.iter().any(|waiting| Arc::ptr_eq(waiting, &job));
+            let film = match (live.next(), rested) {
+                (Some(live), _) => live.film(context),
+                (None, Some((_, gathered))) => gathered.film(context).map(Some),
+                (None, None) if waits => Ok(None),
+                (None, None) => continue,
+            };
+            match film.transpose() {
+                // Who has gone does not need to be told.
+                Some(film) => drop(to.send(film)),
+                None => self.asked.push((job, to)),
+            }
         }
     }
 }

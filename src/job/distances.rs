@@ -33,9 +33,6 @@ pub(super) fn distances(
     // Catmull-Rom's weights sum to 1 and their magnitudes to at most 1.25 along an axis: (1.25³ − 1) / 2 of the range.
     let overshoot = if plan.variant.features.contains(&("INTERPOLATION", 3)) { 0.477 } else { 0.0 };
     let distances = on_device.distances(&mut context.device, &intervals, overshoot)?;
-    let mut bytes = vec![0u8; wide * high * deep];
-    context.device.read(&distances, 0, &mut bytes)?;
-    let empty = bytes.iter().filter(|d| **d > 0).count();
-    plan.reasons.push(format!("{empty} of {} macro-cells are empty under it", bytes.len()));
-    Ok(Some(distances))
+    plan.reasons.push(format!("{} of {} macro-cells are empty under it", distances.empty, wide * high * deep));
+    Ok(Some(distances.buffer))
 }

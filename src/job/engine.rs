@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use serde_json::Value;
-use tokio::sync::watch;
+use tokio::sync::{oneshot, watch};
 
 use super::device_thread::{Command, DeviceThread};
 use super::kernels::{KernelProgress, Kernels};
@@ -15,6 +15,7 @@ use super::{Job, State, develop};
 use crate::config::Limits;
 use crate::device::{DeviceConfig, DeviceInfo, NO_DEVICE};
 use crate::error::{Error, Result};
+use crate::film::Film;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 
@@ -84,7 +85,13 @@ impl Engine {
         let (readiness, ready) = watch::channel(Readiness::Starting);
         let live = limits.live_renders.max(1);
         let kernels = Kernels::default();
-        let thread = DeviceThread { config, kernels: kernels.clone(), commands: commands.clone(), most_live: live };
+        let thread = DeviceThread {
+            config,
+            kernels: kernels.clone(),
+            commands: commands.clone(),
+            most_live: live,
+            keep_film_bytes: limits.keep_film_bytes,
+        };
         std::thread::Builder::new()
             .name("device".into())
             .spawn(move || thread.run(&incoming, &readiness))
@@ -243,6 +250,17 @@ impl Engine {
         self.jobs().by_id.get(id).filter(|j| !j.is_pilot()).cloned()
     }
 
+    /// What a render has gathered by now, with its pixels; of one that has nothing yet once it has.
+    ///
+    /// # Errors
+    /// [`Error::NotFound`] where it is not kept any more.
+    pub async fn film(&self, job: &Arc<Job>) -> Result<Arc<Film>> {
+        let gone = || Error::NotFound { what: "film any more of render", id: job.id().into() };
+        let (to, film) = oneshot::channel();
+        self.inner.commands.send(Command::Film(job.clone(), to)).map_err(|_| gone())?;
+        film.await.map_err(|_| gone())?.map(Arc::new)
+    }
+
     /// Every render that is kept, newest first.
     pub fn list(&self) -> Vec<Arc<Job>> {
         let mut all: Vec<_> = self.jobs().by_id.values().filter(|j| !j.is_pilot()).cloned().collect();
@@ -263,16 +281,6 @@ impl Engine {
         // It may run again by now, or have ended twice.
         if job.state().is_terminal() && !jobs.ended.iter().any(|id| id == job.id()) {
             jobs.ended.push_back(job.id().to_owned());
-        }
-        // The newest keeps its film however large, for whoever waits for it.
-        let kept: Vec<Arc<Job>> =
-            jobs.ended.iter().rev().skip(1).filter_map(|id| jobs.by_id.get(id).cloned()).collect();
-        let mut films = 0;
-        for older in kept {
-            films += older.film_bytes();
-            if films > self.inner.limits.keep_film_bytes {
-                older.drop_film();
-            }
         }
         let mut bytes: usize = jobs.ended.iter().filter_map(|id| jobs.by_id.get(id)).map(|j| j.bytes()).sum();
         while jobs.ended.len() > 1

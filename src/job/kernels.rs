@@ -10,8 +10,8 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use serde::Serialize;
 
 use super::compile::Compiler;
-use crate::device::cells;
 use crate::device::program::{Source, Variant};
+use crate::device::{cells, develop};
 use crate::error::{Error, Result};
 use crate::technique;
 use crate::volume::VoxelType;
@@ -66,7 +66,7 @@ pub(super) struct Kernels {
 
 /// Every kernel that there is.
 pub(super) fn sources() -> impl Iterator<Item = Source> {
-    technique::ALL.iter().map(|t| (t.source)()).chain(cells::sources())
+    technique::ALL.iter().map(|t| (t.source)()).chain(cells::sources()).chain([develop::source()])
 }
 
 /// The source of a variant.
@@ -75,12 +75,13 @@ pub(super) fn source_of(variant: &Variant) -> Result<Source> {
     sources().find(|s| s.kernel == variant.kernel).ok_or_else(missing)
 }
 
-/// What the first picture needs, most likely: the first technique on floats, as built-in volumes have, and on bytes.
+/// What the first picture needs, most likely: the first technique on floats, as built-in volumes have, and on bytes, and
+/// what films are developed by.
 pub(super) fn first() -> Vec<Variant> {
     let views = technique::ALL.first().map_or(Vec::new(), |t| ((t.source)().variants)());
     let of =
         |voxel| views.iter().find(move |v| v.voxel == Some(voxel)).copied().into_iter().chain(cells::needed(voxel));
-    of(VoxelType::F32).chain(of(VoxelType::U8)).collect()
+    of(VoxelType::F32).chain(of(VoxelType::U8)).chain((develop::source().variants)()).collect()
 }
 
 /// What is compiled ahead, the likeliest first.

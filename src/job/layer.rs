@@ -2,6 +2,7 @@
 
 use super::context::DeviceContext;
 use super::tiling::{TILE, Tiling};
+use crate::device::develop::PADDING;
 use crate::device::{Buffer, Device};
 use crate::error::Result;
 use crate::film::Samples;
@@ -28,11 +29,19 @@ pub(super) struct Layer {
 }
 
 impl Layer {
-    /// Room for every `stride`-th pixel of a scene's picture, or of the pixels of it that a pilot has.
+    /// Room for every `stride`-th pixel of a scene's picture, or of the pixels of it that a pilot has; `room` itself where that is as large.
     ///
     /// # Errors
     /// [`crate::error::Error::Internal`] when the device has none.
-    pub fn new(device: &Device, scene: &Scene, volume: &Volume, stride: usize, stream: u32, step: f32) -> Result<Self> {
+    pub fn new(
+        device: &Device,
+        scene: &Scene,
+        volume: &Volume,
+        stride: usize,
+        stream: u32,
+        step: f32,
+        room: Option<Buffer>,
+    ) -> Result<Self> {
         let region = scene.region();
         let apart = stride * region.apart as usize;
         let [width, height] = region.size.map(|n| (n as usize).div_ceil(apart));
@@ -43,7 +52,7 @@ impl Layer {
         };
         let tiling = scene.view().random().map(tiled).transpose()?;
         let table = device.upload(bytemuck::cast_slice(&scene.view().table(volume, step)?), 8)?;
-        let buffer = device.allocate(20 * width * height)?;
+        let buffer = device.allocate_in(room, 20 * width * height + PADDING)?;
         Ok(Self { buffer, width, height, stride, apart, samples: 0, table, step, stream, tiling })
     }
 
@@ -99,25 +108,29 @@ impl Layer {
         (self.width.div_ceil(beam_w) * self.height.div_ceil(beam_h), beam_w * beam_h)
     }
 
-    /// What was gathered, with the squared deviations of the samples or without.
-    pub fn read(&self, context: &DeviceContext, deviations: bool) -> Result<Samples> {
-        let pixels = self.width * self.height;
-        let (mut mean, mut m2) = (vec![0.0f32; 4 * pixels], Vec::new());
-        context.device.read(&self.buffer, 0, &mut mean)?;
-        if deviations {
-            m2 = vec![0.0f32; pixels];
-            context.device.read(&self.buffer, 16 * pixels, &mut m2)?;
-        }
-        let tiles = self.tiling.as_ref().and_then(|(tiling, _)| tiling.counts());
-        Ok(Samples {
+    /// What was gathered, without its values.
+    pub fn unread(&self) -> Samples {
+        Samples {
             width: self.width,
             height: self.height,
             stride: self.stride,
             count: self.samples,
-            mean,
-            m2,
-            tiles,
-        })
+            tiles: self.tiling.as_ref().and_then(|(tiling, _)| tiling.counts()),
+            ..Samples::default()
+        }
+    }
+
+    /// What was gathered, with the squared deviations of the samples or without.
+    pub fn read(&self, context: &DeviceContext, deviations: bool) -> Result<Samples> {
+        let pixels = self.width * self.height;
+        let mut samples = self.unread();
+        samples.mean = vec![0.0; 4 * pixels];
+        context.device.read(&self.buffer, 0, &mut samples.mean)?;
+        if deviations {
+            samples.m2 = vec![0.0; pixels];
+            context.device.read(&self.buffer, 16 * pixels, &mut samples.m2)?;
+        }
+        Ok(samples)
     }
 }
 

@@ -1,24 +1,21 @@
 //! A job on the device thread: what it does with a turn, and what all jobs there share.
 
-use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, Weak};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
 use super::context::DeviceContext;
 use super::field_run::FieldRun;
+use super::gathered::Gathered;
 use super::motion::Motion;
-use super::report::warnings;
 use super::verdict::{Verdict, verdict};
 use super::view_run::{Pass, ViewRun};
 use super::{Job, Snapshot};
-use crate::device::cells;
-use crate::device::program::Variant;
 use crate::error::{Error, Result};
 use crate::film::Film;
-use crate::film::picture::Background;
-use crate::scene::{Scene, Subject};
+use crate::scene::Scene;
 use crate::technique::{FieldPlan, ViewPlan};
 use crate::volume::Volume;
 
@@ -28,6 +25,8 @@ const SLICE: Duration = Duration::from_millis(20);
 const FIELD_SLICE: Duration = Duration::from_millis(40);
 /// Frames are not made faster than the eye sees: encoding takes cores that the device wants.
 const FRAME_EVERY: Duration = Duration::from_millis(30);
+/// The same where nobody looks: for who asks how far it is.
+const UNSEEN_EVERY: Duration = Duration::from_millis(500);
 
 /// What a turn came to.
 pub(super) enum Turn {
@@ -40,38 +39,41 @@ pub(super) enum Turn {
 }
 
 /// What cannot begin before its kernel is compiled: planned once, since a field's plan may take long.
-enum Awaited {
+pub(super) enum Awaited {
     Field(FieldPlan),
     View(Arc<Volume>, ViewPlan),
 }
 
 /// A job with its buffers.
 pub(super) struct Live {
-    job: Arc<Job>,
-    awaited: Option<Awaited>,
-    generation: u64,
-    asked: Instant,
-    started: Instant,
-    scene: Option<Scene>,
-    volume: Option<Arc<Volume>>,
-    field: Option<FieldRun>,
+    pub(super) job: Arc<Job>,
+    pub(super) awaited: Option<Awaited>,
+    pub(super) generation: u64,
+    pub(super) asked: Instant,
+    pub(super) started: Instant,
+    pub(super) scene: Option<Scene>,
+    pub(super) volume: Option<Arc<Volume>>,
+    pub(super) field: Option<FieldRun>,
     /// The field's volume has to be looked at before more is computed.
-    look: bool,
-    result: Option<Value>,
-    view: Option<ViewRun>,
+    pub(super) look: bool,
+    pub(super) result: Option<Value>,
+    pub(super) view: Option<ViewRun>,
+    /// What was gathered earlier, here or for another job: memory for what comes.
+    pub(super) memory: Option<Gathered>,
     /// What the device took for pictures of the field while it had fewer histories.
-    earlier_time: Duration,
+    pub(super) earlier_time: Duration,
     /// The picture when the field had half its histories.
-    half: Option<Film>,
-    field_error: Option<f64>,
-    motion: Motion,
+    pub(super) half: Option<Film>,
+    pub(super) field_error: Option<f64>,
+    pub(super) motion: Motion,
     /// A picture of a moving camera is there, and the one before is still being developed.
-    unseen: bool,
-    last_frame: Option<Instant>,
+    pub(super) unseen: bool,
+    pub(super) last_frame: Option<Instant>,
 }
 
 impl Live {
-    pub fn new(job: Arc<Job>) -> Self {
+    /// A job, with memory for what it gathers.
+    pub fn new(job: Arc<Job>, memory: Option<Gathered>) -> Self {
         let now = Instant::now();
         Self {
             job,
@@ -85,6 +87,7 @@ impl Live {
             look: false,
             result: None,
             view: None,
+            memory,
             earlier_time: Duration::ZERO,
             half: None,
             field_error: None,
@@ -92,6 +95,22 @@ impl Live {
             unseen: false,
             last_frame: None,
         }
+    }
+
+    pub fn is_of(&self, job: &Arc<Job>) -> bool {
+        Arc::ptr_eq(&self.job, job)
+    }
+
+    /// What there is to see, with its pixels; none where there is nothing yet.
+    pub fn film(&mut self, context: &DeviceContext) -> Result<Option<Film>> {
+        let gathered = self.view.as_mut().map(|v| &mut v.gathered).filter(|g| g.is_something());
+        gathered.map(|g| g.film(context)).transpose()
+    }
+
+    /// Ends with what was gathered, which stays on the device.
+    pub fn rest(self) -> Option<(Weak<Job>, Gathered)> {
+        let gathered = self.view?.gathered;
+        gathered.is_something().then(|| (Arc::downgrade(&self.job), gathered))
     }
 
     pub fn fail(&self, error: Error) {
@@ -115,135 +134,6 @@ impl Live {
             return self.field_turn(context);
         }
         self.view_turn(context)
-    }
-
-    /// The first turn, and after that a newer camera where there is one.
-    fn follow_camera(&mut self, context: &mut DeviceContext) -> Result<()> {
-        let first = self.scene.is_none();
-        {
-            let progress = self.job.lock();
-            // A camera is followed once the one before has been seen: cameras may come faster than frames, and none would be.
-            if !first && (progress.generation == self.generation || self.last_frame.is_none()) {
-                return Ok(());
-            }
-            (self.generation, self.asked) = (progress.generation, progress.asked);
-            self.scene = Some(progress.scene.clone());
-        }
-        self.started = Instant::now();
-        self.last_frame = None;
-        self.unseen = false;
-        self.half = None;
-        self.earlier_time = Duration::ZERO;
-        self.learn_motion();
-        let complete = self.job.lock().complete_field.clone();
-        self.aim(context, complete)?;
-        match (&mut self.view, &self.scene, &self.volume) {
-            (Some(view), Some(scene), Some(volume)) if self.generation > 0 => {
-                view.hurry(context, scene, volume, &mut self.motion)
-            }
-            _ => Ok(()),
-        }
-    }
-
-    /// From the newest picture, and how long the first of the camera before took.
-    fn learn_motion(&mut self) {
-        let (seen, took) = {
-            let mut progress = self.job.lock();
-            (progress.film.clone().zip(progress.error), progress.first_frame_before.take())
-        };
-        self.motion.learn(seen, took);
-    }
-
-    /// Points the view at the newest camera, or begins it.
-    fn aim(&mut self, context: &mut DeviceContext, complete: Option<Arc<Volume>>) -> Result<()> {
-        let Some(scene) = &self.scene else { return Ok(()) };
-        match (scene.subject(), &self.volume, &mut self.view) {
-            (_, Some(volume), Some(view)) => {
-                // A field that is still filling is looked at from the new camera at once.
-                self.look = self.field.as_ref().is_some_and(|f| !f.is_done());
-                self.job.started();
-                view.restart(context, scene, volume)
-            }
-            // A field that was computed for an earlier camera is looked at again, not computed again.
-            (Subject::Field(_), _, _) if complete.is_some() => match complete {
-                Some(volume) => self.begin_view(context, volume),
-                None => Ok(()),
-            },
-            (Subject::Volume(volume), _, _) => self.begin_view(context, volume.clone()),
-            (Subject::Field(_), _, _) => self.begin_field(context),
-        }
-    }
-
-    /// Whether kernels are ready; one that is not is waited for.
-    fn is_ready(&self, context: &mut DeviceContext, variants: &[Variant]) -> Result<bool> {
-        let mut all = true;
-        for variant in variants {
-            if !context.is_ready(variant)? {
-                self.job.waits_for(variant);
-                all = false;
-            }
-        }
-        if all {
-            self.job.started();
-        }
-        Ok(all)
-    }
-
-    fn begin_field(&mut self, context: &mut DeviceContext) -> Result<()> {
-        let Some(Subject::Field(field)) = self.scene.as_ref().map(Scene::subject) else { return Ok(()) };
-        let plan = field.plan()?;
-        self.run_field(context, plan)
-    }
-
-    fn run_field(&mut self, context: &mut DeviceContext, plan: FieldPlan) -> Result<()> {
-        if !self.is_ready(context, &[plan.variant])? {
-            self.awaited = Some(Awaited::Field(plan));
-            return Ok(());
-        }
-        let Some(Subject::Field(field)) = self.scene.as_ref().map(Scene::subject) else { return Ok(()) };
-        // A budget of time is for the work, not for compiling.
-        self.started = Instant::now();
-        let run = FieldRun::new(context, field, plan)?;
-        self.job.lock().reasons = run.reasons().to_vec();
-        self.field = Some(run);
-        Ok(())
-    }
-
-    fn begin_view(&mut self, context: &mut DeviceContext, volume: Arc<Volume>) -> Result<()> {
-        let Some(scene) = &self.scene else { return Ok(()) };
-        let plan = scene.view().plan(&volume)?;
-        self.run_view(context, volume, plan)
-    }
-
-    fn run_view(&mut self, context: &mut DeviceContext, volume: Arc<Volume>, plan: ViewPlan) -> Result<()> {
-        let [of_cells, of_distances] = cells::needed(volume.voxel_type());
-        if !self.is_ready(context, &[plan.variant, of_cells, of_distances])? {
-            self.awaited = Some(Awaited::View(volume, plan));
-            return Ok(());
-        }
-        let Some(scene) = &self.scene else { return Ok(()) };
-        if self.field.is_none() {
-            self.started = Instant::now();
-        }
-        let view = ViewRun::new(context, scene, &volume, plan)?;
-        {
-            let mut progress = self.job.lock();
-            progress.reasons = self.field.as_ref().map_or(Vec::new(), |f| f.reasons().to_vec());
-            progress.reasons.extend_from_slice(&view.plan().reasons);
-            progress.counts.non_finite_voxels = volume.non_finite();
-            progress.warnings = warnings(&volume, scene);
-            let simulated = self.result.as_ref().and_then(|r| r["warnings"].as_array());
-            progress.warnings.extend(simulated.into_iter().flatten().cloned());
-            if self.field.is_some() {
-                progress.field = Some(volume.clone());
-            }
-            if self.field.as_ref().is_some_and(FieldRun::is_done) {
-                progress.complete_field = Some(volume.clone());
-            }
-        }
-        self.volume = Some(volume);
-        self.earlier_time += self.view.replace(view).map_or(Duration::ZERO, |earlier| earlier.device_time);
-        Ok(())
     }
 
     fn field_turn(&mut self, context: &mut DeviceContext) -> Result<Turn> {
@@ -300,8 +190,11 @@ impl Live {
                 Ok(if self.job.leave(self.generation) { Turn::Over } else { Turn::Again })
             }
             Verdict::GoOn => {
-                let due = self.last_frame.is_none_or(|t| t.elapsed() >= FRAME_EVERY);
-                let preview = |v: &ViewRun| v.samples() == 0 && !v.is_quick() && !v.has_hurried();
+                let followed = self.job.is_followed();
+                let every = if followed { FRAME_EVERY } else { UNSEEN_EVERY };
+                let due = self.last_frame.unwrap_or(self.started).elapsed() >= every
+                    || (followed && self.last_frame.is_none());
+                let preview = |v: &ViewRun| followed && v.samples() == 0 && !v.is_quick() && !v.has_hurried();
                 let proper = pass == Pass::Main || self.view.as_ref().is_some_and(preview);
                 if due && proper && !self.job.developing.swap(true, Ordering::AcqRel) {
                     self.snapshot(context, None)?;
@@ -323,12 +216,12 @@ impl Live {
     /// The picture against the one of half as many histories: the difference of a mean to that of its first half has the
     /// variance of the mean itself, so it estimates the picture's standard error.
     fn compare_with_half(&mut self, context: &mut DeviceContext) -> Result<()> {
-        let Some(view) = &self.view else { return Ok(()) };
+        let Some(view) = &mut self.view else { return Ok(()) };
         if self.scene.as_ref().is_some_and(|s| s.view().random().is_some()) {
             // Two pictures of one random sample differ by their own noise, whatever the field's.
             return Ok(());
         }
-        let film = view.film(context)?;
+        let film = view.gathered.film(context)?;
         // From a new camera there is no picture of the half yet: the error seen from the last one stands in for it.
         if let Some(half) = &self.half {
             self.field_error = film.difference(half);
@@ -337,28 +230,29 @@ impl Live {
         Ok(())
     }
 
-    fn verdict(&self, context: &DeviceContext, pass: Pass) -> Result<Verdict> {
-        match (&self.view, &self.scene) {
+    fn verdict(&mut self, context: &DeviceContext, pass: Pass) -> Result<Verdict> {
+        match (&mut self.view, &self.scene) {
             (Some(view), Some(scene)) if pass == Pass::Main => {
-                let film = || Ok(Film { field_error: self.field_error, ..view.film(context)? });
-                verdict(view, scene, self.started, film)
+                view.gathered.field_error = self.field_error;
+                verdict(view, scene, self.started, context)
             }
             _ => Ok(Verdict::GoOn),
         }
     }
 
     fn snapshot(&mut self, context: &DeviceContext, stopped_by: Option<&'static str>) -> Result<()> {
-        let Some(view) = &self.view else { return Ok(()) };
-        let background = self.scene.as_ref().map_or(Background::default(), Scene::background);
-        let film = Film { field_error: self.field_error, background, ..view.film(context)? };
+        let Some(view) = &mut self.view else { return Ok(()) };
+        view.gathered.field_error = self.field_error;
+        let film = view.gathered.develop(context)?;
         let device_time =
             self.earlier_time + view.device_time + self.field.as_ref().map_or(Duration::ZERO, |f| f.device_time);
         let snapshot = Snapshot {
             film: Arc::new(film),
+            picture: view.gathered.picture(context)?,
             generation: self.generation,
             elapsed_ms: self.asked.elapsed().as_secs_f64() * 1e3,
             device_ms: device_time.as_secs_f64() * 1e3,
-            counts: view.counts(context)?,
+            counts: view.gathered.counts(context)?,
             result: self.result.clone(),
             stopped_by,
         };

@@ -4,6 +4,7 @@
 //! the async runtime develops the newest of them into a frame (`develop.rs`); readers watch the latest frame and never hold
 //! anybody up.
 
+mod begin;
 mod compile;
 mod context;
 mod develop;
@@ -11,6 +12,7 @@ mod device_thread;
 mod distances;
 mod engine;
 mod field_run;
+mod gathered;
 mod kernels;
 mod layer;
 mod live;
@@ -81,6 +83,7 @@ pub(crate) struct Progress {
     /// The kernel that it waits for, while that is compiled.
     pub waits_for: Option<String>,
     pub result: Option<Value>,
+    /// What the newest picture says of itself, without its pixels.
     pub film: Option<Arc<Film>>,
     pub field: Option<Arc<crate::volume::Volume>>,
     /// The field once all its histories are in it: a new camera looks at it again.
@@ -98,6 +101,8 @@ pub struct Job {
     pilot: bool,
     created_unix_s: u64,
     cancelled: AtomicBool,
+    /// Nobody looks at frames before the final one.
+    final_only: AtomicBool,
     /// Set while a snapshot is being developed: the device thread skips snapshots that nobody could use.
     pub(crate) developing: AtomicBool,
     progress: Mutex<Progress>,
@@ -137,6 +142,7 @@ impl Job {
             pilot,
             created_unix_s: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs()),
             cancelled: AtomicBool::new(false),
+            final_only: AtomicBool::new(pilot),
             developing: AtomicBool::new(false),
             progress: Mutex::new(progress),
             updates: watch::Sender::new(Update { state: State::Queued, frame: None }),
@@ -178,15 +184,18 @@ impl Job {
         self.updates.subscribe()
     }
 
-    /// The newest film, for formats that are made on demand.
-    pub fn film(&self) -> Option<(Arc<Film>, ErrorEstimate)> {
-        let progress = self.lock();
-        Some((progress.film.clone()?, progress.error?))
-    }
-
     /// The grid of a field technique, if the render has one and it has started.
     pub fn field(&self) -> Option<Arc<crate::volume::Volume>> {
         self.lock().field.clone()
+    }
+
+    /// Whether somebody looks at frames before the final one. Where nobody does the device and the encoder are not kept busy with them.
+    pub fn set_followed(&self, followed: bool) {
+        self.final_only.store(!followed, Ordering::Release);
+    }
+
+    pub(crate) fn is_followed(&self) -> bool {
+        !self.final_only.load(Ordering::Acquire)
     }
 
     pub(crate) fn is_cancelled(&self) -> bool {
@@ -284,7 +293,7 @@ impl Job {
 
     /// Publishes a frame of `snapshot`, and with the final one of the newest camera ends the job. `true` when it ended.
     /// A frame of the camera before is worth showing while the newest has none: cameras may come faster than frames.
-    pub(crate) fn publish(&self, snapshot: &Snapshot, png: Vec<u8>, error: ErrorEstimate, clipped: u64) -> bool {
+    pub(crate) fn publish(&self, snapshot: &Snapshot, png: Vec<u8>, error: ErrorEstimate) -> bool {
         let mut progress = self.lock();
         if progress.state.is_terminal() {
             return false;
@@ -295,7 +304,6 @@ impl Job {
         progress.samples = snapshot.film.main.count;
         progress.error = Some(error);
         progress.film = Some(snapshot.film.clone());
-        progress.counts.clipped_values = clipped;
         snapshot.counts.report(&snapshot.film, &mut progress.counts);
         progress.stopped_by = snapshot.stopped_by.filter(|_| ends);
         progress.timings.elapsed_ms = snapshot.elapsed_ms;
@@ -338,27 +346,11 @@ impl Job {
         ends
     }
 
-    /// Lets go of the film; the PNG stays.
-    pub(crate) fn drop_film(&self) {
-        let mut progress = self.lock();
-        if progress.state.is_terminal() {
-            progress.film = None;
-            self.snapshots.send_replace(None);
-        }
-    }
-
-    /// Bytes of the film, which costs ten times the PNG.
-    pub(crate) fn film_bytes(&self) -> usize {
-        self.lock().film.as_ref().map_or(0, |f| f.bytes())
-    }
-
     /// Bytes held for readers.
     pub(crate) fn bytes(&self) -> usize {
         let frame = self.updates.borrow().frame.as_ref().map_or(0, |f| f.png.len());
         let progress = self.lock();
-        frame
-            + progress.film.as_ref().map_or(0, |f| f.bytes())
-            + progress.field.as_ref().map_or(0, |f| f.bytes() as usize)
+        frame + progress.field.as_ref().map_or(0, |f| f.bytes() as usize)
     }
 
     /// Its convergence trace.

@@ -121,11 +121,14 @@ impl Moving {
         before: Option<Self>,
     ) -> Result<Self> {
         let layer = match before {
-            Some(Self { mut layer, lowered: same, .. }) if same == lowered => {
+            Some(Self { mut layer, lowered: same, .. }) if same == lowered && layer.step == lowered.step * step => {
                 layer.restart(&context.device)?;
                 layer
             }
-            _ => Layer::new(&context.device, scene, volume, lowered.apart as usize, STREAM, lowered.step * step)?,
+            _ => {
+                let room = before.map(|b| b.layer.buffer);
+                Layer::new(&context.device, scene, volume, lowered.apart as usize, STREAM, lowered.step * step, room)?
+            }
         };
         Ok(Self { layer, lowered, step_loss })
     }

@@ -9,7 +9,10 @@ use crate::film::Film;
 
 /// What the device thread hands to the developer of a job's frames.
 pub(crate) struct Snapshot {
+    /// What it says of itself, without its pixels.
     pub film: Arc<Film>,
+    /// Its picture in sRGB bytes.
+    pub picture: Vec<u8>,
     pub generation: u64,
     pub elapsed_ms: f64,
     pub device_ms: f64,
@@ -34,12 +37,13 @@ pub(crate) struct SampleCounts {
 impl SampleCounts {
     /// What a job says of them.
     pub fn report(&self, film: &Film, counts: &mut Counts) {
+        counts.clipped_values = film.sums.clipped;
         counts.non_finite_samples = self.non_finite.into();
-        counts.non_finite_pixels = film.main.unknown_pixels() as u64;
+        counts.non_finite_pixels = film.sums.unknown;
         counts.fireflies = self.fireflies.into();
         counts.clamped_samples = self.clamped.into();
         let cut = self.clamped_luminance;
-        counts.clamped_energy = if cut > 0.0 { cut / (film.luminance_sum() + cut) } else { 0.0 };
+        counts.clamped_energy = if cut > 0.0 { cut / (film.sums.weighted + cut) } else { 0.0 };
         counts.broken_majorants = self.broken.into();
         counts.cut_paths = self.cut.into();
     }

@@ -2,9 +2,10 @@
 
 use std::time::Instant;
 
+use super::context::DeviceContext;
 use super::view_run::ViewRun;
 use crate::error::Result;
-use crate::film::{Film, is_round};
+use crate::film::is_round;
 use crate::scene::Scene;
 use crate::technique::Random;
 
@@ -20,12 +21,7 @@ pub(super) enum Verdict {
 /// What to do after a pass. The error is looked at after 2, 3, 4, 6, 8, 12, … samples, a fixed order, so that the same
 /// request stops at the same sample. Where the step, not the noise, keeps the error above what was asked for, the step is
 /// halved; where nothing is left to halve, the render stops and says so.
-pub(super) fn verdict(
-    view: &ViewRun,
-    scene: &Scene,
-    started: Instant,
-    film: impl FnOnce() -> Result<Film>,
-) -> Result<Verdict> {
+pub(super) fn verdict(view: &mut ViewRun, scene: &Scene, started: Instant, context: &DeviceContext) -> Result<Verdict> {
     let (samples, budget) = (view.samples(), scene.budget());
     if samples >= budget.samples {
         return Ok(Verdict::Stop("samples"));
@@ -35,7 +31,7 @@ pub(super) fn verdict(
     }
     let enough = samples >= if scene.view().random().is_some() { Random::LEAST_SAMPLES } else { 2 };
     let Some(most) = budget.max_error.filter(|_| enough && is_round(samples)) else { return Ok(Verdict::GoOn) };
-    let error = film()?.error();
+    let error = view.gathered.develop(context)?.error();
     let noise = error.noise.unwrap_or(0.0);
     let bias = (error.total.powi(2) - noise.powi(2)).max(0.0).sqrt();
     if error.total <= most {

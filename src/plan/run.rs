@@ -106,7 +106,7 @@ pub async fn finish(planner: &Planner<'_>, request: Value, region: Region, field
     };
     let job = to_its_end(planner, request, scene).await?;
     let failed = || Error::internal("a pilot without a film");
-    let (film, _) = job.film().ok_or_else(failed)?;
+    let film = planner.engine.film(&job).await?;
     let rounds = &film.rounds;
     let (Some(first), Some(last)) = (rounds.first(), rounds.last()) else { return Err(failed()) };
     let more = f64::from(last.samples - first.samples);

@@ -114,6 +114,14 @@ impl Bench {
         }
     }
 
+    /// The film of a finished request.
+    ///
+    /// # Errors
+    /// [`Error::NotFound`] where it is not kept any more.
+    pub fn film(&self, job: &Arc<Job>) -> Result<Arc<Film>> {
+        self.handle.block_on(self.engine.film(job))
+    }
+
     fn planner(&self) -> Planner<'_> {
         Planner { engine: &self.engine, store: &self.store, limits: &self.limits, calibrations: &self.calibrations }
     }
@@ -141,7 +149,7 @@ impl Bench {
     pub fn run(&self, request: &Value, reads: Reads) -> Result<Run> {
         let job = self.finish(request)?;
         let reply = job.resource();
-        let (film, error) = job.film().ok_or_else(|| Error::internal("the film is gone"))?;
+        let film = self.film(&job)?;
         let number = |at: &str| reply.pointer(at).and_then(Value::as_f64).unwrap_or(0.0);
         Ok(Run {
             values: read(&film, &reply, reads),
@@ -149,7 +157,7 @@ impl Bench {
             wall_ms: number("/timings/elapsed_ms"),
             samples: u64::from(film.main.count),
             bytes: film.bytes() as u64 + job.field().map_or(0, |f| f.bytes()),
-            stated_error: Some(error.total),
+            stated_error: Some(film.error().total),
             noise_is_random: !film.known_noise(SURE).1,
             reply,
         })

@@ -65,7 +65,23 @@ impl House {
 
     /// The film of a finished request.
     pub fn film(&self, request: &Value) -> (Arc<Film>, ErrorEstimate) {
-        self.finish(request).film().unwrap()
+        let film = self.film_of(&self.finish(request));
+        (film.clone(), film.error())
+    }
+
+    /// The film of a job.
+    pub fn film_of(&self, job: &Arc<Job>) -> Arc<Film> {
+        self.runtime.block_on(self.engine.film(job)).unwrap()
+    }
+
+    /// The final frame of a request.
+    pub fn png(&self, request: &Value) -> Vec<u8> {
+        self.finish(request).watch().borrow().frame.as_ref().unwrap().png.to_vec()
+    }
+
+    /// The bytes of its pixels.
+    pub fn picture(&self, request: &Value) -> Vec<u8> {
+        image::load_from_memory(&self.png(request)).unwrap().into_bytes()
     }
 
     /// Puts a raw volume of floats in the store and returns what goes under `volume`.

@@ -89,7 +89,8 @@ fn voxels_that_are_not_finite_are_empty_and_counted() {
         "emission_absorption": {"transfer_function": {"points": [{"value": 1, "color": [1, 1, 1], "opacity_per_unit": 1}]}}
     });
     let job = house.finish(&request);
-    let (film, error) = job.film().unwrap();
+    let film = house.film_of(&job);
+    let error = film.error();
     assert!(film.main.mean.iter().all(|v| v.is_finite()) && error.total.is_finite());
     let resource = job.resource();
     assert_eq!(resource["counts"]["non_finite_samples"], 0);

@@ -59,7 +59,7 @@ fn planes_that_remove_all_leave_nothing_and_say_so() {
     let mut request = scene(&constant(), white(3.0));
     request["clip"] = json!({"planes": [{"normal": [1, 2, 3], "point": [5, 5, 5]}]});
     let job = house.finish(&request);
-    assert!(job.film().unwrap().0.main.mean.iter().all(|v| *v == 0.0));
+    assert!(house.film_of(&job).main.mean.iter().all(|v| *v == 0.0));
     let resource = job.resource();
     assert!(resource["warnings"].as_array().unwrap().iter().any(|w| w["code"] == "clipped_away"), "{resource}");
 }
@@ -69,10 +69,7 @@ fn a_background_shows_through_and_transparency_is_alpha() {
     let house = House::shared();
     let mut request = scene(&constant(), white(0.5));
     let through = (-1.0f64).exp();
-    let decoded = |request: &Value| {
-        let (film, _) = house.film(request);
-        image::load_from_memory(&film.png().unwrap().0).unwrap()
-    };
+    let decoded = |request: &Value| image::load_from_memory(&house.png(request)).unwrap();
     let encode = |v: f64| ((1.055 * v.powf(1.0 / 2.4) - 0.055) * 255.0).round() as i32;
     request["image"]["background"] = json!([0.1, 0.5, 1]);
     let picture = decoded(&request).to_rgb8();
@@ -90,7 +87,7 @@ fn a_background_shows_through_and_transparency_is_alpha() {
     let pixel = picture.to_rgba8().get_pixel(3, 3).0;
     assert!(pixel[0] >= 254 && (f64::from(pixel[3]) - 255.0 * (1.0 - through)).abs() <= 1.0, "{pixel:?}");
     // The same without a budget's worth of samples: the picture of the error is the film's, not the background's.
-    assert!(house.film(&request).0.exr(&house.film(&request).1).unwrap().len() > 4 * 4 * SIDE * SIDE);
+    assert!(house.film(&request).0.exr().unwrap().len() > 4 * 4 * SIDE * SIDE);
 }
 
 #[test]
@@ -184,7 +181,7 @@ fn a_hole_of_nan_reaches_no_film() {
         let mut request = scene(&volume, own.clone());
         request["emission_absorption"]["transfer_function"] = white(2.0)["transfer_function"].clone();
         let job = house.finish(&request);
-        assert!(job.film().unwrap().0.main.mean.iter().all(|v| v.is_finite()), "{own}");
+        assert!(house.film_of(&job).main.mean.iter().all(|v| v.is_finite()), "{own}");
         assert_eq!(job.resource()["counts"]["non_finite_samples"], 0, "{own}");
     }
 }

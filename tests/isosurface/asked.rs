@@ -47,7 +47,7 @@ fn warned(body: &Value, code: &str) -> (bool, bool) {
     let job = House::shared().finish(body);
     let resource = job.resource();
     let warnings = resource["warnings"].as_array().unwrap().clone();
-    let (film, _) = job.film().unwrap();
+    let film = House::shared().film_of(&job);
     assert!(film.main.mean.iter().all(|v| v.is_finite()));
     (warnings.iter().any(|w| w["code"] == code), film.main.mean.iter().any(|v| *v != 0.0))
 }
@@ -99,8 +99,8 @@ fn hardly_any_voxels_and_voxels_that_are_no_numbers_are_rendered_as_what_they_ar
 
 #[test]
 fn the_manuals_example_is_a_picture() {
-    let (film, error) = House::shared().film(&isosurface::example());
-    let (bytes, _) = film.srgb8();
+    let (_, error) = House::shared().film(&isosurface::example());
+    let bytes = House::shared().picture(&isosurface::example());
     assert!(bytes.iter().any(|b| *b > 100) && bytes.contains(&0), "a lit surface before black");
     assert!(error.total < 0.5, "{error:?}");
 }

@@ -83,7 +83,7 @@ fn holes_are_counted_and_nothing_but_holes_is_transparent() {
             "technique": "projection", "volume": volume, "image": {"width": 16, "height": 16}, "budget": {"samples": 2},
             "projection": {"mode": mode}
         }));
-        let (film, _) = job.film().unwrap();
+        let film = house.film_of(&job);
         assert!(film.main.mean.iter().all(|v| *v == 0.0), "{mode}");
         assert_eq!(job.resource()["counts"]["non_finite_voxels"], 216);
         assert_eq!(job.resource()["counts"]["non_finite_samples"], 0);

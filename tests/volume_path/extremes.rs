@@ -122,7 +122,7 @@ fn a_broken_majorant_is_biased_and_said_to_be() {
         let job = House::shared().finish(&request);
         let codes = job.resource()["warnings"].to_string();
         (
-            mean(&job.film().unwrap().0),
+            mean(&House::shared().film_of(&job)),
             codes.contains("broken_majorant"),
             job.resource()["counts"]["broken_majorants"].as_u64().unwrap(),
         )
@@ -149,7 +149,7 @@ fn beside_voxels_that_are_not_a_number_the_rest_is_as_it_is() {
                 request["seed"] = json!(seed);
                 let job = House::shared().finish(&request);
                 assert_eq!(job.resource()["counts"]["broken_majorants"], 0, "{technique} {tracking}");
-                let film = job.film().unwrap().0;
+                let film = House::shared().film_of(&job);
                 finite(&film);
                 film
             };

@@ -84,7 +84,7 @@ fn clamping_says_what_it_takes() {
     let run = |more: &Value| {
         let request = scene("volume_path", &smoke(), &camera(), &own(more), 48, 64);
         let job = House::shared().finish(&request);
-        (total(&job.film().unwrap().0).0, job.resource()["counts"].clone())
+        (total(&House::shared().film_of(&job)).0, job.resource()["counts"].clone())
     };
     let (all, counts) = run(&json!({}));
     assert_eq!((&counts["clamped_samples"], counts["clamped_energy"].as_f64()), (&json!(0), Some(0.0)));

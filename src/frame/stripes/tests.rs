@@ -73,8 +73,7 @@ fn streams_of_every_length_are_joined() -> Result<()> {
 fn a_wrong_checksum_is_noticed() -> Result<()> {
     let size = [256, 256];
     let pixels = picture(size, 3, SMOOTH);
-    let fill = |rows: Range<usize>, out: &mut [u8]| out.copy_from_slice(&pixels[768 * rows.start..768 * rows.end]);
-    let (mut deflated, _) = Deflated::new(size, 3, fill)?;
+    let mut deflated = Deflated::new(size, 3, &pixels)?;
     assert!(deflated.stripes.len() > 4);
     deflated.stripes[2].adler ^= 1;
     assert!(decode(&deflated.png(String::new())?).is_err());

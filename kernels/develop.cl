@@ -1,0 +1,214 @@
+// The film developed where it is: the picture in sRGB bytes, and sums that its error is made of. What is large stays on the device.
+//
+// Items, in order: blocks of two rows of the film; rows of the control; where the film has fewer pixels than the picture (WHOLE 0), rows
+// of the picture, which is interpolated. Each of the first two leaves SUMS numbers of its own, which the host adds up in double precision.
+// Squares are added up as parts of the greatest square so far, so that none is lost below the least float.
+
+// Pixels of a row that a work-item takes; a whole number of packets and of tiles.
+#define ACROSS (LANES == 1 ? 32 : 8 * LANES)
+#define SUMS 10
+enum { LUMINANCE, LUMINANCE_SCALE, TRUNCATED, BLOCKS, NOISE_SCALE, NOISE, NOISE_SQUARES, UNKNOWN, CLIPPED, WEIGHTED };
+// Of a row of the control.
+enum { DIFFERENCE_SCALE, DIFFERENCE, VARIANCE };
+
+// Makes `scale` the greatest yet; what the squares that are parts of the square of the one before are to be multiplied by.
+static inline float rescale(float *scale, Real values) {
+    if (!any_lane(MASK(values > *scale))) return 1.0f;
+    float before = *scale;
+    *scale = greatest_lane(values);
+    float ratio = before / *scale;
+    return ratio * ratio;
+}
+
+static inline float inverse(float scale) { return scale > 0.0f ? 1.0f / scale : 0.0f; }
+
+static inline float sum_lanes(Real v) {
+#if LANES == 1
+    return v;
+#else
+    RealLanes lanes;
+    lanes.v = v;
+    float sum = 0.0f;
+    for (int i = 0; i < LANES; i++) sum += lanes.lane[i];
+    return sum;
+#endif
+}
+
+// The mean squared deviation from their mean of four pixels; of two rows of a packet the sum of those of whole blocks of 2 × 2.
+#if LANES == 1
+#define FOUR Real
+#else
+typedef JOIN(float, HALF) HalfReal;
+#define FOUR HalfReal
+#endif
+static inline FOUR of_four(FOUR a, FOUR b, FOUR c, FOUR d) {
+    FOUR mean = 0.25f * (a + b + c + d);
+    a -= mean, b -= mean, c -= mean, d -= mean;
+    return 0.25f * (a * a + b * b + c * c + d * d);
+}
+#if LANES > 1
+static inline float of_blocks(Real upper, Real lower, int inside) {
+    HalfReal whole = of_four(upper.even, upper.odd, lower.even, lower.odd);
+    return sum_lanes(select((Real)(0.0f), (Real)(whole, (HalfReal)(0.0f)), MASK(LANE_IDS < inside / 2)));
+}
+#endif
+
+// What one sample of each of some pixels differs by: its variance, 0 where that is not known.
+static inline Real variances(Real m2, Real count) {
+    return select((Real)(0.0f), m2 / (count - 1.0f), MASK(count > 1.0f) & known(m2));
+}
+
+static inline void of_film(constant Develop *d, global const float *film, global const uint *counts, global const uchar *curve,
+                           global uchar *picture, int block, global float *sums) {
+    int across = (d->width + ACROSS - 1) / ACROSS;
+    int x0 = block % across * ACROSS, y0 = block / across * 2;
+    int rows = min(2, d->height - y0), end = min(x0 + ACROSS, d->width);
+    global const float *deviations = film + 4 * d->width * d->height;
+    float scale = 0.0f, blocks = 0.0f, noise_scale = 0.0f;
+    Real luminance = (Real)(0.0f), truncated = luminance, noise = luminance, squares = luminance, weighted = luminance;
+    int unknown = 0, clipped = 0;
+#if LANES == 1
+    float before[2] = {0.0f, 0.0f};
+#endif
+    for (int x = x0; x < end; x += LANES) {
+        int inside = end - x;
+        Mask lanes = MASK(LANE_IDS < inside);
+        Real light[2] = {(Real)(0.0f), (Real)(0.0f)};
+        uint samples = d->tile > 0 ? counts[y0 / d->tile * d->tiles_wide + x / d->tile] : (uint)d->count;
+        for (int row = 0; row < rows; row++) {
+            int pixel = (y0 + row) * d->width + x;
+            Real alpha;
+            Real3 colour = load_pixels(film, pixel, &alpha);
+#if WHOLE
+            clipped += store_pixels(d, curve, picture, pixel, inside, colour, alpha);
+#endif
+            Real l = select((Real)(0.0f), luminances(colour), lanes);
+            light[row] = l;
+            luminance += l;
+            weighted += l * (float)samples;
+            float ratio = rescale(&scale, fabs(l));
+            if (ratio != 1.0f) truncated *= ratio, blocks *= ratio;
+            Real through = 1.0f - alpha;
+            Real behind = (through > 0.0f ? through : (Real)(0.0f)) * l * inverse(scale);
+            truncated += select((Real)(0.0f), behind * behind, MASK(through <= d->ended));
+            if (!d->deviations) continue;
+            Real m2 = load_reals(deviations, pixel);
+            unknown += count_lanes(~known(m2) & lanes);
+            if (samples < 2) continue;
+            Real squared = select((Real)(0.0f), m2 / ((float)samples * (float)(samples - 1)), known(m2) & lanes);
+            ratio = rescale(&noise_scale, squared);
+            if (ratio != 1.0f) squares *= ratio;
+            Real part = squared * inverse(noise_scale);
+            noise += squared;
+            squares += part * part;
+        }
+        float one = inverse(scale);
+#if LANES == 1
+        if (rows == 2 && (x & 1)) blocks += of_four(before[0] * one, light[0] * one, before[1] * one, light[1] * one);
+        before[0] = light[0], before[1] = light[1];
+#else
+        if (rows == 2) blocks += of_blocks(light[0] * one, light[1] * one, inside);
+#endif
+    }
+    sums[LUMINANCE] = sum_lanes(luminance);
+    sums[LUMINANCE_SCALE] = scale;
+    sums[TRUNCATED] = sum_lanes(truncated);
+    sums[BLOCKS] = blocks;
+    sums[NOISE_SCALE] = noise_scale;
+    sums[NOISE] = sum_lanes(noise);
+    sums[NOISE_SQUARES] = sum_lanes(squares);
+    sums[UNKNOWN] = (float)unknown;
+    sums[CLIPPED] = (float)clipped;
+    sums[WEIGHTED] = sum_lanes(weighted);
+}
+
+// A row of the control against the film's pixels at the same places.
+static inline void of_control(constant Develop *d, global const float *film, global const float *control, global const uint *counts,
+                              int y, global float *sums) {
+    global const float *deviations = film + 4 * d->width * d->height;
+    float scale = 0.0f;
+    Real difference = (Real)(0.0f), variance = difference;
+    int row = y * d->control_stride;
+    for (int x = 0; x < d->control_width; x += LANES) {
+        Mask lanes = MASK(LANE_IDS < d->control_width - x);
+        Real alpha;
+        Real l = luminances(load_pixels(control, y * d->control_width + x, &alpha));
+        Int column = select((Int)(0), (x + LANE_IDS) * d->control_stride, lanes);
+        Int at = row * d->width + column;
+        Real3 colour = real3(gather_reals(film, 4 * at), gather_reals(film, 4 * at + 1), gather_reals(film, 4 * at + 2));
+        Real apart = select((Real)(0.0f), fabs(luminances(colour) - l), lanes);
+        float ratio = rescale(&scale, apart);
+        if (ratio != 1.0f) difference *= ratio;
+        Real part = apart * inverse(scale);
+        difference += part * part;
+        if (!d->deviations) continue;
+        Real samples = (Real)((float)d->count);
+        if (d->tile > 0) {
+            Int tile = row / d->tile * d->tiles_wide + column / d->tile;
+            samples = to_real(gather_ints((global const int *)counts, tile));
+        }
+        variance += select((Real)(0.0f), variances(gather_reals(deviations, at), samples), lanes);
+    }
+    sums[DIFFERENCE_SCALE] = scale;
+    sums[DIFFERENCE] = sum_lanes(difference);
+    sums[VARIANCE] = sum_lanes(variance);
+}
+
+#if !WHOLE
+// Where a pixel of the picture is among the film's `n`: between `low` and the one after, `part` of the way.
+static inline Int place(Int full, int stride, int n, Int *high, Real *part) {
+    Real at = to_real(full) / (float)stride;
+    at = at < (float)(n - 1) ? at : (Real)((float)(n - 1));
+    Int low = min(to_int(at), (Int)(max(n - 2, 0)));
+    *high = min(low + 1, (Int)(n - 1));
+    *part = at - to_real(low);
+    return low;
+}
+
+static inline Real between(Real a, Real b, Real part) {
+#pragma OPENCL FP_CONTRACT OFF
+    Real more = (b - a) * part;
+    return a + more;
+}
+
+// A row of the picture from a film of fewer pixels; how many values were clipped.
+static inline int enlarge(constant Develop *d, global const float *film, global const uchar *curve, global uchar *picture, int y) {
+    int clipped = 0;
+    Int y1;
+    Real fy;
+    Int y0 = place((Int)(y), d->stride, d->height, &y1, &fy);
+    for (int x = 0; x < d->picture_width; x += LANES) {
+        Int x1;
+        Real fx;
+        Int x0 = place(x + LANE_IDS, d->stride, d->width, &x1, &fx);
+        Real out[4];
+        for (int c = 0; c < 4; c++) {
+            Real top = between(gather_reals(film, 4 * (y0 * d->width + x0) + c), gather_reals(film, 4 * (y0 * d->width + x1) + c), fx);
+            Real low = between(gather_reals(film, 4 * (y1 * d->width + x0) + c), gather_reals(film, 4 * (y1 * d->width + x1) + c), fx);
+            out[c] = between(top, low, fy);
+        }
+        clipped += store_pixels(d, curve, picture, y * d->picture_width + x, d->picture_width - x, real3(out[0], out[1], out[2]), out[3]);
+    }
+    return clipped;
+}
+#endif
+
+kernel void develop(constant Develop *d, global const float *film, global const float *control, global const uint *counts,
+                    global const uchar *curve, global uchar *picture, global float *sums) {
+    int item = (int)get_global_id(0);
+    int blocks = (d->width + ACROSS - 1) / ACROSS * ((d->height + 1) / 2);
+    if (item < blocks) {
+        of_film(d, film, counts, curve, picture, item, sums + SUMS * item);
+        return;
+    }
+    global float *own = sums + SUMS * item;
+    item -= blocks;
+    if (item < d->control_height) {
+        of_control(d, film, control, counts, item, own);
+        return;
+    }
+#if !WHOLE
+    item -= d->control_height;
+    if (item < d->picture_height) own[0] = (float)enlarge(d, film, curve, picture, item);
+#endif
+}

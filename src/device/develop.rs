@@ -1,0 +1,253 @@
+//! Films developed on the device: the picture in sRGB bytes and the sums that its error is made of. The film itself, with 20 bytes a
+//! pixel, stays where it is until somebody asks for it.
+
+use std::rc::Rc;
+
+use super::program::{Source, Variant};
+use super::structs::DeviceStruct;
+use super::{Buffer, Device};
+use crate::device_struct;
+use crate::error::Result;
+use crate::film::picture::Background;
+use crate::film::{Apart, Samples, Sums, srgb};
+
+/// Numbers that a work-item leaves: `SUMS` of `kernels/develop.cl`.
+const SUMS: usize = 10;
+/// Bytes that lanes may read behind a film's last pixel.
+pub const PADDING: usize = 256;
+/// The same behind a table.
+const TABLE_PADDING: usize = 8;
+
+device_struct! {
+    /// What the kernel is told.
+    pub struct Develop {
+        /// Size of the film in its own pixels.
+        pub width: i32,
+        /// Its rows.
+        pub height: i32,
+        /// It has every `stride`-th pixel of the picture.
+        pub stride: i32,
+        /// Size of the picture.
+        pub picture_width: i32,
+        /// Its rows.
+        pub picture_height: i32,
+        /// Whether the picture has an alpha channel in place of a background.
+        pub transparent: i32,
+        /// The background, linear.
+        pub behind: [f32; 3],
+        /// What still gets through where rays end.
+        pub ended: f32,
+        /// Samples of a pixel.
+        pub count: i32,
+        /// Pixels along the side of a tile with samples of its own; 0 where all have as many.
+        pub tile: i32,
+        /// Tiles across.
+        pub tiles_wide: i32,
+        /// Whether squared deviations are looked at.
+        pub deviations: i32,
+        /// Pixels across of the control,
+        pub control_width: i32,
+        /// down, or 0 where there is none,
+        pub control_height: i32,
+        /// and how many of the film's pixels they are apart.
+        pub control_stride: i32,
+    }
+}
+
+/// A set of samples on the device.
+#[derive(Clone, Copy)]
+pub struct Set<'a> {
+    /// Means, then squared deviations (`kernels/shared/film.h`), and [`PADDING`].
+    pub buffer: &'a Buffer,
+    /// What they are, without their values.
+    pub samples: &'a Samples,
+}
+
+/// How a film is developed.
+#[derive(Debug, Clone, Copy)]
+pub struct Look {
+    /// Size of the picture.
+    pub size: [usize; 2],
+    /// What is behind the volume.
+    pub background: Background,
+    /// Opacity at which rays end.
+    pub opacity_threshold: f64,
+    /// Whether squared deviations are looked at: of one sample that was finite everywhere there are none.
+    pub deviations: bool,
+}
+
+fn variant(whole: bool) -> Variant {
+    Variant { kernel: "develop", voxel: None, features: if whole { &[("WHOLE", 1)] } else { &[("WHOLE", 0)] } }
+}
+
+/// The kernel.
+pub fn source() -> Source {
+    Source {
+        kernel: "develop",
+        headers: &["shared/lanes.h", "shared/pixels.h"],
+        structs: Develop::opencl_text,
+        arguments: 7,
+        volume: None,
+        variants: || [true, false].map(variant).to_vec(),
+        common: 2,
+    }
+}
+
+/// Pixels of a row that a work-item takes: `ACROSS` of the kernel.
+fn across(lanes: usize) -> usize {
+    if lanes == 1 { 32 } else { 8 * lanes }
+}
+
+/// The curve of sRGB on the device, for all who develop there.
+///
+/// # Errors
+/// [`crate::error::Error::Internal`] when the device has no room.
+pub fn curve(device: &Device) -> Result<Rc<Buffer>> {
+    device.upload(srgb::table(), TABLE_PADDING).map(Rc::new)
+}
+
+/// Memory that films of one picture are developed in, and the curve of sRGB.
+pub struct Developer {
+    settings: Buffer,
+    curve: Rc<Buffer>,
+    picture: Buffer,
+    sums: Buffer,
+    channels: usize,
+    size: [usize; 2],
+}
+
+impl Developer {
+    /// Room for a picture, in the memory of the one `before` where that is as large; `curve` is [`curve`]'s.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Internal`] when the device has none.
+    pub fn new(
+        device: &mut Device,
+        curve: &Rc<Buffer>,
+        size: [usize; 2],
+        background: Background,
+        before: Option<Self>,
+    ) -> Result<Self> {
+        for whole in [true, false] {
+            device.build(&source(), &variant(whole))?;
+        }
+        let channels = background.channels();
+        let (picture, sums) = before.map(|b| (b.picture, b.sums)).unzip();
+        Ok(Self {
+            settings: device.allocate(size_of::<Develop>())?,
+            curve: curve.clone(),
+            picture: device.allocate_in(picture, channels * size[0] * size[1])?,
+            sums: sums.map_or_else(|| device.allocate(1), Ok)?,
+            channels,
+            size,
+        })
+    }
+
+    /// Bytes on the device.
+    pub fn bytes(&self) -> usize {
+        self.picture.len() + self.sums.len()
+    }
+
+    /// Develops `main`, measured against `control`: what its error is made of. The picture is there to be read then.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Internal`] when the device has no room or the kernel fails.
+    pub fn develop(&mut self, device: &Device, main: Set<'_>, control: Option<Set<'_>>, look: &Look) -> Result<Sums> {
+        let (width, height) = (main.samples.width, main.samples.height);
+        let whole = main.samples.stride == 1 && [width, height] == self.size;
+        let blocks = width.div_ceil(across(device.info().lanes as usize)) * height.div_ceil(2);
+        let controls = control.map_or(0, |c| c.samples.height);
+        let items = blocks + controls + if whole { 0 } else { self.size[1] };
+        if self.sums.len() < 4 * SUMS * items {
+            self.sums = device.allocate(4 * SUMS * items)?;
+        }
+        device.write(&mut self.settings, 0, bytemuck::bytes_of(&settings(main, control, look)))?;
+        let counts =
+            main.samples.tiles.as_ref().map(|t| device.upload(bytemuck::cast_slice(&t.counts), 0)).transpose()?;
+        let arguments = [
+            &self.settings,
+            main.buffer,
+            control.map_or(main.buffer, |c| c.buffer),
+            counts.as_ref().unwrap_or(&self.sums),
+            &self.curve,
+            &self.picture,
+            &self.sums,
+        ];
+        device.run(&variant(whole), &arguments, items)?;
+        let mut numbers = vec![[0.0f32; SUMS]; items];
+        device.read(&self.sums, 0, &mut numbers)?;
+        let (of_film, others) = numbers.split_at(blocks);
+        let (of_control, of_picture) = others.split_at(controls);
+        let mut sums: Sums = of_film.iter().map(sums_of_block).sum();
+        sums.block_count = (width / 2) * (height / 2);
+        sums.clipped += of_picture.iter().map(|n| n[0] as u64).sum::<u64>();
+        sums.control = control.map(|c| apart(of_control, c.samples.pixels()));
+        Ok(sums)
+    }
+
+    /// The picture last developed: three bytes of sRGB a pixel, or four with an alpha that is not multiplied into them.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Internal`] when OpenCL fails.
+    pub fn picture(&self, device: &Device) -> Result<Vec<u8>> {
+        let mut picture = vec![0; self.channels * self.size[0] * self.size[1]];
+        device.read(&self.picture, 0, &mut picture)?;
+        Ok(picture)
+    }
+}
+
+fn settings(main: Set<'_>, control: Option<Set<'_>>, look: &Look) -> Develop {
+    let behind = match look.background {
+        Background::Colour(behind) => behind,
+        Background::Transparent => [0.0; 3],
+    };
+    let int = |n: usize| n as i32;
+    let main = main.samples;
+    let tiles = main.tiles.as_ref().map_or([0; 2], |t| [int(t.side), int(t.wide)]);
+    let control = control.map_or([0; 3], |c| [int(c.samples.width), int(c.samples.height), int(c.samples.stride)]);
+    Develop {
+        width: int(main.width),
+        height: int(main.height),
+        stride: int(main.stride),
+        picture_width: int(look.size[0]),
+        picture_height: int(look.size[1]),
+        transparent: (look.background == Background::Transparent).into(),
+        behind,
+        ended: (1.0 - look.opacity_threshold) as f32,
+        count: main.count as i32,
+        tile: tiles[0],
+        tiles_wide: tiles[1],
+        deviations: look.deviations.into(),
+        control_width: control[0],
+        control_height: control[1],
+        control_stride: control[2],
+    }
+}
+
+/// What an item of the film left, in the kernel's order.
+fn sums_of_block(numbers: &[f32; SUMS]) -> Sums {
+    let [luminance, scale, truncated, blocks, noise_scale, noise, noise_squares, unknown, clipped, weighted] =
+        numbers.map(f64::from);
+    Sums {
+        luminance,
+        truncated: truncated * scale * scale,
+        blocks: blocks * scale * scale,
+        noise,
+        noise_squares: noise_squares * noise_scale * noise_scale,
+        unknown: unknown as u64,
+        clipped: clipped as u64,
+        weighted,
+        ..Sums::default()
+    }
+}
+
+/// What the items of the control left.
+fn apart(rows: &[[f32; SUMS]], pixels: usize) -> Apart {
+    let [mut squared, mut variance] = [0.0; 2];
+    for row in rows {
+        let [scale, part, own] = [row[0], row[1], row[2]].map(f64::from);
+        squared += part * scale * scale;
+        variance += own;
+    }
+    Apart { squared, variance, pixels }
+}
