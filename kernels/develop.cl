@@ -6,8 +6,8 @@
 
 // Pixels of a row that a work-item takes; a whole number of packets and of tiles.
 #define ACROSS (LANES == 1 ? 32 : 8 * LANES)
-#define SUMS 10
-enum { LUMINANCE, LUMINANCE_SCALE, TRUNCATED, BLOCKS, NOISE_SCALE, NOISE, NOISE_SQUARES, UNKNOWN, CLIPPED, WEIGHTED };
+#define SUMS 12
+enum { LUMINANCE, LUMINANCE_SCALE, TRUNCATED, BLOCKS, BETWEEN, PIXELS_BETWEEN, NOISE_SCALE, NOISE, NOISE_SQUARES, UNKNOWN, CLIPPED, WEIGHTED };
 // Of a row of the control.
 enum { DIFFERENCE_SCALE, DIFFERENCE, VARIANCE };
 
@@ -53,6 +53,27 @@ static inline float of_blocks(Real upper, Real lower, int inside) {
 }
 #endif
 
+// The sum over every second pixel of a row of a block of the squared difference to the mean of its neighbours: what is lost of a picture that
+// is interpolated between every second one. `row` has the pixels of a packet; the last of one lane is kept in `last`, the one before first.
+static inline float of_between(Real row, float scale, int x, int inside, float *last, float *pixels) {
+    float sum = 0.0f;
+#if LANES == 1
+    if (!(x & 1)) {
+        float apart = scale * (last[1] - 0.5f * (last[0] + row));
+        if (x % ACROSS) sum = apart * apart, *pixels += 1.0f;
+    }
+    last[0] = last[1], last[1] = row;
+#else
+    RealLanes lanes;
+    lanes.v = row;
+    for (int i = 1; i + 1 < min(LANES, inside); i += 2) {
+        float apart = scale * (lanes.lane[i] - 0.5f * (lanes.lane[i - 1] + lanes.lane[i + 1]));
+        sum += apart * apart, *pixels += 1.0f;
+    }
+#endif
+    return sum;
+}
+
 // What one sample of each of some pixels differs by: its variance, 0 where that is not known.
 static inline Real variances(Real m2, Real count) {
     return select((Real)(0.0f), m2 / (count - 1.0f), MASK(count > 1.0f) & known(m2));
@@ -64,12 +85,14 @@ static inline void of_film(constant Develop *d, global const float *film, global
     int x0 = block % across * ACROSS, y0 = block / across * 2;
     int rows = min(2, d->height - y0), end = min(x0 + ACROSS, d->width);
     global const float *deviations = film + 4 * d->width * d->height;
-    float scale = 0.0f, blocks = 0.0f, noise_scale = 0.0f;
+    float scale = 0.0f, blocks = 0.0f, between = 0.0f, pixels = 0.0f, noise_scale = 0.0f;
     Real luminance = (Real)(0.0f), truncated = luminance, noise = luminance, squares = luminance, weighted = luminance;
     int unknown = 0, clipped = 0;
-#if LANES == 1
-    float before[2] = {0.0f, 0.0f};
+#if WHOLE
+    Int empty = picture_bytes(d, curve, real3(luminance, luminance, luminance), luminance, (Mask)(0), &clipped);
+    int clipped_empty = d->transparent ? 0 : (d->behind[0] > 1.0f) + (d->behind[1] > 1.0f) + (d->behind[2] > 1.0f);
 #endif
+    float before[2][2] = {{0.0f, 0.0f}, {0.0f, 0.0f}};
     for (int x = x0; x < end; x += LANES) {
         int inside = end - x;
         Mask lanes = MASK(LANE_IDS < inside);
@@ -79,15 +102,20 @@ static inline void of_film(constant Develop *d, global const float *film, global
             int pixel = (y0 + row) * d->width + x;
             Real alpha;
             Real3 colour = load_pixels(film, pixel, &alpha);
+            // Beside the volume there is nothing to add up but what is not known.
+            Int lit = as_Int(colour.x) | as_Int(colour.y) | as_Int(colour.z) | as_Int(alpha);
+            int is_empty = !any_lane(MASK(lit != 0) & lanes);
 #if WHOLE
-            clipped += store_pixels(d, curve, picture, pixel, inside, colour, alpha);
+            store_bytes(d, picture, pixel, inside, is_empty ? empty : picture_bytes(d, curve, colour, alpha, lanes, &clipped));
+            clipped += is_empty ? clipped_empty * min(inside, LANES) : 0;
 #endif
+            if (is_empty && !d->deviations) continue;
             Real l = select((Real)(0.0f), luminances(colour), lanes);
             light[row] = l;
             luminance += l;
             weighted += l * (float)samples;
             float ratio = rescale(&scale, fabs(l));
-            if (ratio != 1.0f) truncated *= ratio, blocks *= ratio;
+            if (ratio != 1.0f) truncated *= ratio, blocks *= ratio, between *= ratio;
             Real through = 1.0f - alpha;
             Real behind = (through > 0.0f ? through : (Real)(0.0f)) * l * inverse(scale);
             truncated += select((Real)(0.0f), behind * behind, MASK(through <= d->ended));
@@ -104,16 +132,18 @@ static inline void of_film(constant Develop *d, global const float *film, global
         }
         float one = inverse(scale);
 #if LANES == 1
-        if (rows == 2 && (x & 1)) blocks += of_four(before[0] * one, light[0] * one, before[1] * one, light[1] * one);
-        before[0] = light[0], before[1] = light[1];
+        if (rows == 2 && (x & 1)) blocks += of_four(before[0][1] * one, light[0] * one, before[1][1] * one, light[1] * one);
 #else
         if (rows == 2) blocks += of_blocks(light[0] * one, light[1] * one, inside);
 #endif
+        for (int row = 0; row < rows; row++) between += of_between(light[row], one, x, inside, before[row], &pixels);
     }
     sums[LUMINANCE] = sum_lanes(luminance);
     sums[LUMINANCE_SCALE] = scale;
     sums[TRUNCATED] = sum_lanes(truncated);
     sums[BLOCKS] = blocks;
+    sums[BETWEEN] = between;
+    sums[PIXELS_BETWEEN] = pixels;
     sums[NOISE_SCALE] = noise_scale;
     sums[NOISE] = sum_lanes(noise);
     sums[NOISE_SQUARES] = sum_lanes(squares);
@@ -187,7 +217,9 @@ static inline int enlarge(constant Develop *d, global const float *film, global 
             Real low = between(gather_reals(film, 4 * (y1 * d->width + x0) + c), gather_reals(film, 4 * (y1 * d->width + x1) + c), fx);
             out[c] = between(top, low, fy);
         }
-        clipped += store_pixels(d, curve, picture, y * d->picture_width + x, d->picture_width - x, real3(out[0], out[1], out[2]), out[3]);
+        int inside = d->picture_width - x;
+        Int bytes = picture_bytes(d, curve, real3(out[0], out[1], out[2]), out[3], MASK(LANE_IDS < inside), &clipped);
+        store_bytes(d, picture, y * d->picture_width + x, inside, bytes);
     }
     return clipped;
 }

@@ -163,9 +163,15 @@ impl Film {
         if mean > 0.0 { absolute / mean } else { absolute }
     }
 
-    /// What half the resolution would lose, relative.
+    /// What half the resolution would lose, interpolated to this one, relative.
     pub fn resolution_loss(&self) -> f64 {
-        self.relative(self.sums.of_blocks())
+        self.relative(self.sums.of_every_second())
+    }
+
+    /// What twice the step lost at the control's pixels, relative; with the noise of both.
+    pub fn step_loss_seen(&self) -> Option<f64> {
+        let apart = self.sums.control?;
+        Some(self.relative((apart.squared / apart.pixels.max(1) as f64).sqrt()))
     }
 
     /// Bytes of the film on the device.

@@ -55,6 +55,11 @@ typedef struct { Real x, y, z; } Real3;
 static inline int any_lane(Mask m) { return __builtin_ia32_cvtd2mask512(m) != 0; }
 #elif LANES == 8 && defined(__AVX2__) && __has_builtin(__builtin_ia32_movmskps256)
 static inline int any_lane(Mask m) { return __builtin_ia32_movmskps256(as_float8(m)) != 0; }
+#elif LANES == 4 && defined(__SSE__) && __has_builtin(__builtin_ia32_movmskps)
+static inline int any_lane(Mask m) { return __builtin_ia32_movmskps(as_float4(m)) != 0; }
+#elif LANES == 4
+// PoCL 6's any() of four makes LLVM 18 give up on some kernels (pocl issue 1608).
+static inline int any_lane(Mask m) { return (m.x | m.y | m.z | m.w) != 0; }
 #else
 static inline int any_lane(Mask m) { return any(m); }
 #endif

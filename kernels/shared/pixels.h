@@ -55,12 +55,23 @@ static inline int count_clipped(Real3 c, Mask lanes) {
 
 typedef union { Int v; uchar4 lane[LANES]; } ByteLanes;
 
-// The picture's bytes of pixels of a row, of which `inside` are the picture's: three each over the background, or four with an alpha that
-// is not multiplied into them. Returns how many values were clipped.
-static inline int store_pixels(constant Develop *d, global const uchar *curve, global uchar *picture, int at, int inside, Real3 colour,
-                               Real alpha) {
+// Writes the bytes of pixels of a row, of which `inside` are the picture's.
+static inline void store_bytes(constant Develop *d, global uchar *picture, int at, int inside, Int bytes) {
+    ByteLanes lanes;
+    lanes.v = bytes;
+    for (int i = 0; i < LANES; i++) {
+        if (i >= inside) break;
+        if (d->transparent)
+            vstore4(lanes.lane[i], at + i, picture);
+        else
+            vstore3(lanes.lane[i].xyz, at + i, picture);
+    }
+}
+
+// The bytes of pixels: three each over the background, or four with an alpha that is not multiplied into them. Adds to `clipped` how many
+// values of `lanes` were.
+static inline Int picture_bytes(constant Develop *d, global const uchar *curve, Real3 colour, Real alpha, Mask lanes, int *clipped) {
 #pragma OPENCL FP_CONTRACT OFF
-    Mask lanes = MASK(LANE_IDS < inside);
     Int last = (Int)(0);
     if (d->transparent) {
         Real scale = alpha > 0.0f ? 1.0f / alpha : (Real)(0.0f);
@@ -74,14 +85,6 @@ static inline int store_pixels(constant Develop *d, global const uchar *curve, g
         Real red = through * d->behind[0], green = through * d->behind[1], blue = through * d->behind[2];
         colour = real3(colour.x + red, colour.y + green, colour.z + blue);
     }
-    ByteLanes bytes;
-    bytes.v = srgb(curve, colour.x) | srgb(curve, colour.y) << 8 | srgb(curve, colour.z) << 16 | last << 24;
-    for (int i = 0; i < LANES; i++) {
-        if (i >= inside) break;
-        if (d->transparent)
-            vstore4(bytes.lane[i], at + i, picture);
-        else
-            vstore3(bytes.lane[i].xyz, at + i, picture);
-    }
-    return count_clipped(colour, lanes);
+    *clipped += count_clipped(colour, lanes);
+    return srgb(curve, colour.x) | srgb(curve, colour.y) << 8 | srgb(curve, colour.z) << 16 | last << 24;
 }

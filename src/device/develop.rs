@@ -12,7 +12,7 @@ use crate::film::picture::Background;
 use crate::film::{Apart, Samples, Sums, srgb};
 
 /// Numbers that a work-item leaves: `SUMS` of `kernels/develop.cl`.
-const SUMS: usize = 10;
+const SUMS: usize = 12;
 /// Bytes that lanes may read behind a film's last pixel.
 pub const PADDING: usize = 256;
 /// The same behind a table.
@@ -226,12 +226,26 @@ fn settings(main: Set<'_>, control: Option<Set<'_>>, look: &Look) -> Develop {
 
 /// What an item of the film left, in the kernel's order.
 fn sums_of_block(numbers: &[f32; SUMS]) -> Sums {
-    let [luminance, scale, truncated, blocks, noise_scale, noise, noise_squares, unknown, clipped, weighted] =
-        numbers.map(f64::from);
+    let [
+        luminance,
+        scale,
+        truncated,
+        blocks,
+        between,
+        pixels_between,
+        noise_scale,
+        noise,
+        noise_squares,
+        unknown,
+        clipped,
+        weighted,
+    ] = numbers.map(f64::from);
     Sums {
         luminance,
         truncated: truncated * scale * scale,
         blocks: blocks * scale * scale,
+        between: between * scale * scale,
+        pixels_between: pixels_between as u64,
         noise,
         noise_squares: noise_squares * noise_scale * noise_scale,
         unknown: unknown as u64,

@@ -17,6 +17,10 @@ pub struct Sums {
     pub blocks: f64,
     /// and how many blocks there are.
     pub block_count: usize,
+    /// Of the squared difference of every second pixel of a row to the mean of its neighbours,
+    pub between: f64,
+    /// over so many pixels: all that have both neighbours in their part of a row.
+    pub pixels_between: u64,
     /// Pixels of which a sample was not finite.
     pub unknown: u64,
     /// Values of the picture that were clipped at white.
@@ -47,6 +51,8 @@ impl std::iter::Sum for Sums {
             noise_squares: a.noise_squares + b.noise_squares,
             blocks: a.blocks + b.blocks,
             block_count: a.block_count + b.block_count,
+            between: a.between + b.between,
+            pixels_between: a.pixels_between + b.pixels_between,
             unknown: a.unknown + b.unknown,
             clipped: a.clipped + b.clipped,
             control: a.control.or(b.control),
@@ -59,5 +65,11 @@ impl Sums {
     /// what this resolution loses on a picture that is smooth at its scale.
     pub(super) fn of_blocks(&self) -> f64 {
         (self.blocks / self.block_count.max(1) as f64).sqrt()
+    }
+
+    /// Root mean square of what is lost where only every second pixel of every second row is there and the others are interpolated: across
+    /// for a quarter of the pixels, down for a quarter, both for a quarter.
+    pub(super) fn of_every_second(&self) -> f64 {
+        (self.between / self.pixels_between.max(1) as f64).sqrt()
     }
 }

@@ -20,20 +20,20 @@ impl Live {
     pub(super) fn follow_camera(&mut self, context: &mut DeviceContext) -> Result<()> {
         let first = self.scene.is_none();
         {
-            let progress = self.job.lock();
+            let mut progress = self.job.lock();
             // A camera is followed once the one before has been seen: cameras may come faster than frames, and none would be.
             if !first && (progress.generation == self.generation || self.last_frame.is_none()) {
                 return Ok(());
             }
             (self.generation, self.asked) = (progress.generation, progress.asked);
             self.scene = Some(progress.scene.clone());
+            progress.frame_ms.take().into_iter().for_each(|took| self.motion.learn(took));
         }
         self.started = Instant::now();
         self.last_frame = None;
         self.unseen = false;
         self.half = None;
         self.earlier_time = Duration::ZERO;
-        self.learn_motion();
         let complete = self.job.lock().complete_field.clone();
         self.aim(context, complete)?;
         match (&mut self.view, &self.scene, &self.volume) {
@@ -42,15 +42,6 @@ impl Live {
             }
             _ => Ok(()),
         }
-    }
-
-    /// From the newest picture, and how long the first of the camera before took.
-    fn learn_motion(&mut self) {
-        let (seen, took) = {
-            let mut progress = self.job.lock();
-            (progress.film.clone().zip(progress.error), progress.first_frame_before.take())
-        };
-        self.motion.learn(seen, took);
     }
 
     /// Points the view at the newest camera, or begins it.

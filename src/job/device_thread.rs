@@ -2,17 +2,16 @@
 
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender};
-use std::sync::{Arc, Weak};
 
 use tokio::sync::{oneshot, watch};
 
 use super::Job;
 use super::context::DeviceContext;
 use super::engine::Readiness;
-use super::gathered::Gathered;
 use super::kernels::Kernels;
-use super::live::{Live, Turn};
+use super::live::{Live, Rested, Turn};
 use crate::device::{DeviceConfig, NO_DEVICE};
 use crate::error::{Error, Result};
 use crate::film::Film;
@@ -48,7 +47,7 @@ struct Renders {
     /// Those that wait for a kernel.
     parked: VecDeque<Live>,
     /// What ended ones have gathered, the newest last.
-    rested: Vec<(Weak<Job>, Gathered)>,
+    rested: Vec<Rested>,
     /// Who wants to see a film.
     asked: Vec<(Arc<Job>, oneshot::Sender<Result<Film>>)>,
 }
@@ -114,8 +113,8 @@ impl Renders {
         self.waiting.retain(|job| !job.state().is_terminal());
         while self.live.len() < most_live {
             let Some(job) = self.waiting.pop_front() else { break };
-            let memory = self.memory_for(&job, keep_film_bytes);
-            self.live.push_back(Live::new(job, memory));
+            let rested = self.memory_for(&job, keep_film_bytes);
+            self.live.push_back(Live::new(job, rested));
         }
         metrics::gauge!("cloudchamber_renders_live").set(self.live.len() as f64);
         metrics::gauge!("cloudchamber_renders_waiting").set((self.waiting.len() + self.parked.len()) as f64);
@@ -130,12 +129,12 @@ impl Renders {
         }
     }
     /// What a render is to gather in: what it gathered before, or what the oldest did where that would be let go of for it.
-    fn memory_for(&mut self, job: &Arc<Job>, keep_film_bytes: usize) -> Option<Gathered> {
-        let own = self.rested.iter().position(|(of, _)| std::ptr::eq(of.as_ptr(), &**job));
-        let bytes: usize = self.rested.iter().map(|(_, gathered)| gathered.bytes()).sum();
-        let newest = self.rested.last().map_or(0, |(_, gathered)| gathered.bytes());
+    fn memory_for(&mut self, job: &Arc<Job>, keep_film_bytes: usize) -> Option<Rested> {
+        let own = self.rested.iter().position(|r| r.is_of(job));
+        let bytes: usize = self.rested.iter().map(|r| r.gathered.bytes()).sum();
+        let newest = self.rested.last().map_or(0, |r| r.gathered.bytes());
         let oldest = (self.rested.len() > 1 && bytes + newest > keep_film_bytes).then_some(0);
-        own.or(oldest).map(|at| self.rested.remove(at).1)
+        own.or(oldest).map(|at| self.rested.remove(at))
     }
 
     /// Keeps what an ended render has gathered, and lets go of the oldest past the limit; not of the newest, however large, for whoever waits
@@ -145,8 +144,8 @@ impl Renders {
         self.rested.extend(ended.rest());
         let mut bytes = 0;
         let mut kept = 0;
-        for (_, gathered) in self.rested.iter().rev() {
-            bytes += gathered.bytes();
+        for rested in self.rested.iter().rev() {
+            bytes += rested.gathered.bytes();
             if kept > 0 && bytes > keep_film_bytes {
                 break;
             }
@@ -157,18 +156,18 @@ impl Renders {
 
     /// Lets go of what nobody can ask for any more.
     fn forget(&mut self) {
-        self.rested.retain(|(job, _)| job.strong_count() > 0);
+        self.rested.retain(|rested| rested.job.strong_count() > 0);
     }
 
     /// Shows films to who asked: at once where there is something to see, else once there is; not where the render has left nothing.
     fn show(&mut self, context: &DeviceContext) {
         for (job, to) in std::mem::take(&mut self.asked) {
             let mut live = self.live.iter_mut().chain(&mut self.parked).filter(|live| live.is_of(&job));
-            let rested = self.rested.iter_mut().find(|(of, _)| std::ptr::eq(of.as_ptr(), &*job));
+            let rested = self.rested.iter_mut().find(|rested| rested.is_of(&job));
             let waits = self.waiting.iter().any(|waiting| Arc::ptr_eq(waiting, &job));
             let film = match (live.next(), rested) {
                 (Some(live), _) => live.film(context),
-                (None, Some((_, gathered))) => gathered.film(context).map(Some),
+                (None, Some(rested)) => rested.gathered.film(context).map(Some),
                 (None, None) if waits => Ok(None),
                 (None, None) => continue,
             };

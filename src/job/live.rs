@@ -44,6 +44,19 @@ pub(super) enum Awaited {
     View(Arc<Volume>, ViewPlan),
 }
 
+/// What is left of a job that has ended.
+pub(super) struct Rested {
+    pub job: Weak<Job>,
+    pub gathered: Gathered,
+    pub motion: Motion,
+}
+
+impl Rested {
+    pub fn is_of(&self, job: &Arc<Job>) -> bool {
+        std::ptr::eq(self.job.as_ptr(), &**job)
+    }
+}
+
 /// A job with its buffers.
 pub(super) struct Live {
     pub(super) job: Arc<Job>,
@@ -72,8 +85,10 @@ pub(super) struct Live {
 }
 
 impl Live {
-    /// A job, with memory for what it gathers.
-    pub fn new(job: Arc<Job>, memory: Option<Gathered>) -> Self {
+    /// A job, with memory for what it gathers: its own of an earlier camera, or another's.
+    pub fn new(job: Arc<Job>, rested: Option<Rested>) -> Self {
+        let own = rested.as_ref().is_some_and(|r| r.is_of(&job));
+        let (memory, motion) = rested.map(|r| (r.gathered, r.motion)).unzip();
         let now = Instant::now();
         Self {
             job,
@@ -91,7 +106,7 @@ impl Live {
             earlier_time: Duration::ZERO,
             half: None,
             field_error: None,
-            motion: Motion::new(),
+            motion: motion.filter(|_| own).unwrap_or_else(Motion::new),
             unseen: false,
             last_frame: None,
         }
@@ -108,9 +123,10 @@ impl Live {
     }
 
     /// Ends with what was gathered, which stays on the device.
-    pub fn rest(self) -> Option<(Weak<Job>, Gathered)> {
+    pub fn rest(self) -> Option<Rested> {
         let gathered = self.view?.gathered;
-        gathered.is_something().then(|| (Arc::downgrade(&self.job), gathered))
+        let job = Arc::downgrade(&self.job);
+        gathered.is_something().then_some(Rested { job, gathered, motion: self.motion })
     }
 
     pub fn fail(&self, error: Error) {
@@ -173,6 +189,11 @@ impl Live {
         }
         if pass == Pass::Main && self.view.as_ref().is_some_and(|v| v.samples() == 1) && self.field.is_some() {
             self.compare_with_half(context)?;
+        }
+        if let (Pass::Main, Some(view), true) = (pass, &mut self.view, self.job.is_followed())
+            && view.gathered.samples() == 1
+        {
+            self.motion.see(&view.gathered.develop(context)?);
         }
         match self.verdict(context, pass)? {
             Verdict::Refine => {
@@ -250,6 +271,8 @@ impl Live {
             film: Arc::new(film),
             picture: view.gathered.picture(context)?,
             generation: self.generation,
+            is_first: self.last_frame.is_none(),
+            made: Instant::now(),
             elapsed_ms: self.asked.elapsed().as_secs_f64() * 1e3,
             device_ms: device_time.as_secs_f64() * 1e3,
             counts: view.gathered.counts(context)?,

@@ -37,7 +37,7 @@ use tokio::sync::watch;
 
 use crate::device::program::Variant;
 use crate::error::{Error, Result};
-use crate::film::{ErrorEstimate, Film};
+use crate::film::ErrorEstimate;
 use crate::scene::Scene;
 use crate::scene::camera::Camera;
 
@@ -73,8 +73,10 @@ pub(crate) struct Progress {
     pub warnings: Vec<Value>,
     pub trace: Vec<TracePoint>,
     pub timings: Timings,
-    /// How long the camera before the newest one waited for its first frame, ms.
-    pub first_frame_before: Option<f64>,
+    /// What the first frame of a camera took of late, ms: since that was asked for, or since the frame before where cameras wait for theirs.
+    pub frame_ms: Option<f64>,
+    /// When the newest frame came.
+    pub published: Option<Instant>,
     pub counts: Counts,
     pub samples: u32,
     pub error: Option<ErrorEstimate>,
@@ -83,8 +85,6 @@ pub(crate) struct Progress {
     /// The kernel that it waits for, while that is compiled.
     pub waits_for: Option<String>,
     pub result: Option<Value>,
-    /// What the newest picture says of itself, without its pixels.
-    pub film: Option<Arc<Film>>,
     pub field: Option<Arc<crate::volume::Volume>>,
     /// The field once all its histories are in it: a new camera looks at it again.
     pub complete_field: Option<Arc<crate::volume::Volume>>,
@@ -122,7 +122,8 @@ impl Job {
             warnings: Vec::new(),
             trace: Vec::new(),
             timings: Timings::default(),
-            first_frame_before: None,
+            frame_ms: None,
+            published: None,
             counts: Counts::default(),
             samples: 0,
             error: None,
@@ -130,7 +131,6 @@ impl Job {
             failure: None,
             waits_for: None,
             result: None,
-            film: None,
             field: None,
             complete_field: None,
             sequence: 0,
@@ -264,7 +264,6 @@ impl Job {
         progress.generation += 1;
         progress.asked = Instant::now();
         progress.trace.clear();
-        progress.first_frame_before = progress.timings.first_frame_ms;
         progress.timings = Timings::default();
         progress.stopped_by = None;
         let again = !progress.in_engine;
@@ -303,13 +302,18 @@ impl Job {
         progress.sequence += 1;
         progress.samples = snapshot.film.main.count;
         progress.error = Some(error);
-        progress.film = Some(snapshot.film.clone());
         snapshot.counts.report(&snapshot.film, &mut progress.counts);
         progress.stopped_by = snapshot.stopped_by.filter(|_| ends);
         progress.timings.elapsed_ms = snapshot.elapsed_ms;
         progress.timings.device_ms = snapshot.device_ms;
-        let now = progress.asked.elapsed().as_secs_f64() * 1e3;
+        let since = |t: Instant| t.elapsed().as_secs_f64() * 1e3;
+        let now = since(progress.asked);
         progress.timings.first_frame_ms.get_or_insert(now);
+        let before = progress.published.replace(Instant::now());
+        if snapshot.is_first {
+            let waited = snapshot.elapsed_ms + since(snapshot.made);
+            progress.frame_ms = Some(before.map_or(waited, |before| waited.min(since(before))));
+        }
         if let Some(result) = &snapshot.result {
             progress.result = Some(result.clone());
         }

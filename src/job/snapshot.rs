@@ -1,6 +1,7 @@
 //! What the device thread leaves of a render for others to look at.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use serde_json::Value;
 
@@ -14,6 +15,10 @@ pub(crate) struct Snapshot {
     /// Its picture in sRGB bytes.
     pub picture: Vec<u8>,
     pub generation: u64,
+    /// Whether it is its camera's first,
+    pub is_first: bool,
+    /// and when it was made.
+    pub made: Instant,
     pub elapsed_ms: f64,
     pub device_ms: f64,
     pub counts: SampleCounts,

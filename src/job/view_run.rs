@@ -218,7 +218,8 @@ impl ViewRun {
             return Ok(None);
         }
         if let (Pass::Moving, Some(moving)) = (pass, &self.gathered.moving) {
-            self.ray_ms = Some(moving.ray_ms(self.pass_time.as_secs_f64() * 1e3));
+            let [width, height] = self.gathered.size;
+            self.ray_ms = Some(moving.ray_ms(self.pass_time.as_secs_f64() * 1e3, width * height));
         }
         if pass == Pass::Main {
             self.ray_ms = None;
