@@ -9,15 +9,15 @@ use crate::volume::Volume;
 
 /// A frame to the next: as often as most screens show one, where that loses no more than [`MOST_LOSS`], with room for what goes wrong;
 const SMOOTH_MS: f64 = 16.0;
-/// else 20 a second, with what the way to the client and back takes.
-const STEADY_MS: f64 = 45.0;
+/// else 30 a second.
+const STEADY_MS: f64 = 32.0;
 /// What of that the device may have: at first, at least, at most.
 const SMOOTH_DEVICE_MS: [f64; 3] = [13.0, 2.0, 14.0];
-const STEADY_DEVICE_MS: [f64; 3] = [25.0, 5.0, 40.0];
+const STEADY_DEVICE_MS: [f64; 3] = [25.0, 5.0, 29.0];
 /// What a smooth motion may lose, relative.
 const MOST_LOSS: f64 = 0.09;
 /// How much the device's part may change from one frame to the next: down at once, up slowly, so that pictures do not change to and fro.
-const CHANGE: [f64; 2] = [0.8, 1.02];
+const CHANGE: [f64; 2] = [0.9, 1.03];
 /// Pixels that a sample stands for along a side, at most.
 const MOST_APART: u32 = 16;
 /// Steps that are tried, of the one asked for.
@@ -236,7 +236,7 @@ mod tests {
         assert_eq!(lowered, Lowered { apart: 1, step: 4.0 });
         assert!((loss - 0.05).abs() < 1e-12);
         assert!(gentle.is_smooth);
-        // A step of twice would do for 20 ms, and lose 20 %: all of it, 20 times a second.
+        // A step of twice would do for 20 ms, and lose 20 %: all of it, 30 times a second.
         let mut rough = motion(Losses { resolution: 0.5, step: Some(0.2) });
         assert_eq!(rough.least(2e5, 1e-4, false), (Lowered::default(), 0.0));
         assert!(!rough.is_smooth);
