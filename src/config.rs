@@ -106,7 +106,7 @@ pub struct Limits {
     /// Finished renders that stay readable
     #[arg(long, env = "CLOUDCHAMBER_KEEP_RENDERS", default_value_t = 128)]
     pub keep_renders: usize,
-    /// Most bytes of finished films kept in memory for EXR; past this the oldest keep their PNG only
+    /// Most bytes of films of ended renders that stay on the device for EXR and differences; past this the oldest keep their PNG only
     #[arg(long, env = "CLOUDCHAMBER_KEEP_FILM_BYTES", default_value_t = 48 << 20)]
     pub keep_film_bytes: usize,
     /// Most bytes of finished pictures kept in memory

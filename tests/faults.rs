@@ -9,6 +9,8 @@ mod bodies;
 mod cameras;
 #[path = "faults/fields.rs"]
 mod fields;
+#[path = "faults/films.rs"]
+mod films;
 #[path = "faults/protocol.rs"]
 mod protocol;
 #[path = "api/support.rs"]

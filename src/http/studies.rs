@@ -9,18 +9,26 @@ use serde_json::{Value, json};
 use super::App;
 use super::problem::Id;
 use crate::error::{Error, Result};
+use crate::study::CASES;
 use crate::study::planner::Planned;
 use crate::study::record::Record;
-use crate::study::shelf::{PLANNER, STABILITY, Shelf};
+use crate::study::shelf::{PEERS, PLANNER, STABILITY, Shelf};
 use crate::study::stability::Stability;
-use crate::study::{CASES, Case};
 
 const ROOT: &str = "/v1/studies";
+
+/// Of whom comparisons with another program are.
+const WHEN: &str = "a volume, and VTK at hand";
+const CHOOSE: &str = "the longest step that is wrong by no more than VTK's picture: the table says what it takes";
 
 /// `GET /v1/studies`.
 pub(super) async fn list(State(app): State<App>) -> Result<Json<Value>> {
     let listed = tokio::task::spawn_blocking(move || {
-        let cases: Vec<Value> = CASES.iter().filter_map(|c| describe(c, &app.studies)).collect();
+        let shelf = &app.studies;
+        let peers = shelf.names().into_iter().filter(|name| name.starts_with(PEERS));
+        let cases =
+            CASES.iter().map(|c| (c.name.to_owned(), c.when, c.choose)).chain(peers.map(|name| (name, WHEN, CHOOSE)));
+        let cases: Vec<Value> = cases.filter_map(|(name, when, choose)| describe(&name, when, choose, shelf)).collect();
         json!({"studies": cases, "stability": app.studies.record(STABILITY).as_ref().map(describe_stability),
             "planner": app.studies.record(PLANNER).as_ref().map(describe_planner)})
     });
@@ -28,10 +36,10 @@ pub(super) async fn list(State(app): State<App>) -> Result<Json<Value>> {
 }
 
 /// A case in short; none that was not measured.
-fn describe(case: &Case, shelf: &Shelf) -> Option<Value> {
-    let record: Record = shelf.record(case.name)?;
+fn describe(name: &str, when: &str, choose: &str, shelf: &Shelf) -> Option<Value> {
+    let record: Record = shelf.record(name)?;
     Some(json!({
-        "name": record.name, "title": record.title, "when": case.when, "choose": case.choose, "truth": record.truth,
+        "name": record.name, "title": record.title, "when": when, "choose": choose, "truth": record.truth,
         "quick": record.quick, "machine": record.machine, "equal_error": record.equal_error, "equal_time": record.equal_time,
         "href": format!("{ROOT}/{}", record.name), "charts": [format!("{ROOT}/{}.svg", record.name)],
     }))

@@ -21,6 +21,9 @@ pub const STABILITY: &str = "stability";
 /// The name of the planner's study.
 pub const PLANNER: &str = "planner";
 
+/// What the names of records start with that compare with another program: `./dev bench equal_error` makes them.
+pub const PEERS: &str = "vtk_";
+
 /// A folder of studies.
 #[derive(Debug, Clone)]
 pub struct Shelf {
