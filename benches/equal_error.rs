@@ -162,7 +162,7 @@ fn compare(bench: &Bench, shelf: &Shelf, subject: &Subject, mode: &str, paramete
     let finest = with(0.1, json!({"opacity_threshold": 1.0, "jitter": true}));
     let truth = bench.run(&subject.request(&volume, 0, 64, &finest), Reads::Luminance).unwrap().values;
     let Some((vtk_s, picture)) = subject.vtk(mode) else { panic!("no VTK: ./dev bench installs it") };
-    let raw = measure(&[picture.clone()], &truth).unwrap();
+    let raw = measure(std::slice::from_ref(&picture), &truth).unwrap();
     let vtk = measure(&[fitted(&picture, &truth)], &truth).unwrap();
     let ours = |name: &str, more: Value| {
         let of = |step: &f64| {

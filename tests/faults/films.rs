@@ -16,13 +16,13 @@ async fn films_past_the_limit_are_gone_and_the_newest_never_is() {
     let server = Server::start_with(&["--keep-film-bytes", "1"]);
     let api = Api::new(&server);
     let first = api.finish(&scene(1)).await["id"].as_str().unwrap().to_owned();
-    let exr = |id: String| async { api.get(&format!("/v1/renders/{id}/frame.exr")).await };
-    assert_eq!(exr(first.clone()).await.status(), 200, "it is the newest");
+    let exr = async |id: &str| api.get(&format!("/v1/renders/{id}/frame.exr")).await;
+    assert_eq!(exr(&first).await.status(), 200, "it is the newest");
     let second = api.finish(&scene(2)).await["id"].as_str().unwrap().to_owned();
-    let gone = problem(exr(first.clone()).await, 404, "an older film").await;
+    let gone = problem(exr(&first).await, 404, "an older film").await;
     assert!(gone["detail"].as_str().is_some_and(|d| d.contains("film any more")), "{gone}");
     assert_eq!(api.get(&format!("/v1/renders/{first}/frame.png")).await.status(), 200, "its picture stays");
-    assert_eq!(exr(second.clone()).await.status(), 200);
+    assert_eq!(exr(&second).await.status(), 200);
     let apart = api.get(&format!("/v1/renders/{second}/difference?with={first}")).await;
     problem(apart, 404, "a difference to it").await;
 }
