@@ -108,6 +108,7 @@ async fn finished(app: &App, job: Arc<Job>, fresh: bool, format: &str) -> Result
     let _permit = app.stream_permit()?;
     if fresh {
         job.set_followed(false);
+        job.set_film_wanted(format == "image/x-exr");
     }
     let frame = wait_for(app, &job, true).await?;
     guard.armed = false;
@@ -166,7 +167,9 @@ fn png_response(frame: &Frame) -> Response {
 
 /// The film as it is by now: that of a running render may have more samples than its newest frame.
 async fn exr_response(app: &App, job: &Arc<Job>, frame: &Frame) -> Result<Response> {
-    let film = app.engine.film(job).await?;
+    let film = app.engine.film(job).await;
+    job.set_film_wanted(false);
+    let film = film?;
     let frame = Frame { samples: film.main.count, error: film.error(), lowered: film.lowered, ..frame.clone() };
     let bytes = tokio::task::spawn_blocking(move || film.exr()).await.map_err(Error::internal)??;
     let etag = frame::etag(&bytes);

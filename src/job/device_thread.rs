@@ -128,30 +128,29 @@ impl Renders {
             Err(_) => current.fail(Error::internal("a panic on the device thread")),
         }
     }
+
     /// What a render is to gather in: what it gathered before, or what the oldest did where that would be let go of for it.
     fn memory_for(&mut self, job: &Arc<Job>, keep_film_bytes: usize) -> Option<Rested> {
         let own = self.rested.iter().position(|r| r.is_of(job));
-        let bytes: usize = self.rested.iter().map(|r| r.gathered.bytes()).sum();
         let newest = self.rested.last().map_or(0, |r| r.gathered.bytes());
-        let oldest = (self.rested.len() > 1 && bytes + newest > keep_film_bytes).then_some(0);
-        own.or(oldest).map(|at| self.rested.remove(at))
+        let oldest = || self.oldest(keep_film_bytes.saturating_sub(newest));
+        own.or_else(oldest).map(|at| self.rested.remove(at))
     }
 
-    /// Keeps what an ended render has gathered, and lets go of the oldest past the limit; not of the newest, however large, for whoever waits
-    /// for it.
+    /// Keeps what an ended render has gathered, and lets go of the oldest past the limit.
     fn rest(&mut self, ended: Live, keep_film_bytes: usize) {
         self.forget();
         self.rested.extend(ended.rest());
-        let mut bytes = 0;
-        let mut kept = 0;
-        for rested in self.rested.iter().rev() {
-            bytes += rested.gathered.bytes();
-            if kept > 0 && bytes > keep_film_bytes {
-                break;
-            }
-            kept += 1;
+        while let Some(oldest) = self.oldest(keep_film_bytes) {
+            self.rested.remove(oldest);
         }
-        self.rested.drain(..self.rested.len() - kept);
+    }
+
+    /// The oldest that may go where all are more than `keep_film_bytes`: not the newest, however large, nor what somebody waits for.
+    fn oldest(&self, keep_film_bytes: usize) -> Option<usize> {
+        let bytes: usize = self.rested.iter().map(|r| r.gathered.bytes()).sum();
+        let (_, others) = self.rested.split_last().filter(|_| bytes > keep_film_bytes)?;
+        others.iter().position(|r| !r.job.upgrade().is_some_and(|job| job.is_film_wanted()))
     }
 
     /// Lets go of what nobody can ask for any more.

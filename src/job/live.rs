@@ -116,13 +116,15 @@ impl Live {
         Arc::ptr_eq(&self.job, job)
     }
 
-    /// What there is to see, with its pixels; none where there is nothing yet.
+    /// What there is to see, with its pixels; none where there is nothing yet, or a pass is under way.
     pub fn film(&mut self, context: &DeviceContext) -> Result<Option<Film>> {
-        let gathered = self.view.as_mut().map(|v| &mut v.gathered).filter(|g| g.is_something());
+        let between = self.view.as_mut().filter(|v| v.is_between_passes());
+        let gathered = between.map(|v| &mut v.gathered).filter(|g| g.is_something());
         gathered.map(|g| g.film(context)).transpose()
     }
 
-    /// Ends with what was gathered, which stays on the device.
+    /// Ends with what was gathered, which stays on the device. Of a render that was cancelled within a pass some pixels have a sample more than
+    /// it says, so that their error is a little less than it says.
     pub fn rest(self) -> Option<Rested> {
         let gathered = self.view?.gathered;
         let job = Arc::downgrade(&self.job);

@@ -103,6 +103,8 @@ pub struct Job {
     cancelled: AtomicBool,
     /// Nobody looks at frames before the final one.
     final_only: AtomicBool,
+    /// Its film is waited for, whatever the limit of those that are kept.
+    film_wanted: AtomicBool,
     /// Set while a snapshot is being developed: the device thread skips snapshots that nobody could use.
     pub(crate) developing: AtomicBool,
     progress: Mutex<Progress>,
@@ -143,6 +145,7 @@ impl Job {
             created_unix_s: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs()),
             cancelled: AtomicBool::new(false),
             final_only: AtomicBool::new(pilot),
+            film_wanted: AtomicBool::new(pilot),
             developing: AtomicBool::new(false),
             progress: Mutex::new(progress),
             updates: watch::Sender::new(Update { state: State::Queued, frame: None }),
@@ -196,6 +199,15 @@ impl Job {
 
     pub(crate) fn is_followed(&self) -> bool {
         !self.final_only.load(Ordering::Acquire)
+    }
+
+    /// Whether somebody waits for its end to see its film, which is not let go of then.
+    pub fn set_film_wanted(&self, wanted: bool) {
+        self.film_wanted.store(wanted, Ordering::Release);
+    }
+
+    pub(crate) fn is_film_wanted(&self) -> bool {
+        self.film_wanted.load(Ordering::Acquire)
     }
 
     pub(crate) fn is_cancelled(&self) -> bool {

@@ -132,6 +132,11 @@ impl ViewRun {
         self.gathered.samples()
     }
 
+    /// Whether no pass is under way: all pixels have as many samples as it says.
+    pub fn is_between_passes(&self) -> bool {
+        self.pass.is_none()
+    }
+
     /// Whether a picture of the control is not worth showing.
     pub fn is_quick(&self) -> bool {
         self.quick

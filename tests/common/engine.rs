@@ -33,7 +33,7 @@ impl House {
         let _one_at_a_time = ONCE.lock().unwrap();
         device::keep_compiled_kernels_in(&super::kernel_cache()).unwrap();
         let data = tempfile::tempdir().unwrap();
-        let limits = Flags::parse_from(["test"]).limits;
+        let limits = Flags::parse_from(["test", "--keep-film-bytes", "1000000000"]).limits;
         let store = Store::open(&data.path().join("volumes"), limits.store()).unwrap();
         let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().unwrap();
         let config = DeviceConfig { lanes, kernels: super::kernels(), ..DeviceConfig::pocl() };
