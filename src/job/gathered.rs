@@ -40,6 +40,8 @@ pub(super) struct Gathered {
     opacity_threshold: f64,
     background: Background,
     developer: Developer,
+    /// What was developed last, as long as it is what there is to see.
+    developed: Option<Film>,
 }
 
 impl Gathered {
@@ -79,6 +81,7 @@ impl Gathered {
             opacity_threshold: plan.opacity_threshold,
             background: scene.background(),
             developer,
+            developed: None,
         })
     }
 
@@ -87,7 +90,7 @@ impl Gathered {
         context.device.write(&mut self.counts, 0, &[0; 32])?;
         self.layers.iter_mut().try_for_each(|layer| layer.restart(&context.device))?;
         self.rounds.forget();
-        self.field_error = None;
+        (self.field_error, self.developed) = (None, None);
         Ok(())
     }
 
@@ -145,8 +148,22 @@ impl Gathered {
         self.layer(self.shown()).samples > 0
     }
 
-    /// Develops what there is to see: what it says of itself, without its pixels.
+    /// What there is to see is about to be another.
+    pub fn will_change(&mut self) {
+        self.developed = None;
+    }
+
+    /// Develops what there is to see, unless that has been done: what it says of itself, without its pixels.
     pub fn develop(&mut self, context: &DeviceContext) -> Result<Film> {
+        let film = match self.developed.take() {
+            Some(film) => film,
+            None => self.develop_anew(context)?,
+        };
+        self.developed = Some(film.clone());
+        Ok(Film { field_error: self.field_error, ..film })
+    }
+
+    fn develop_anew(&mut self, context: &DeviceContext) -> Result<Film> {
         let pass = self.shown();
         // Of one sample a pixel has no deviation: it tells only where that sample was not finite.
         let non_finite = self.counts(context)?.non_finite > 0;

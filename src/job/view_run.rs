@@ -152,6 +152,7 @@ impl ViewRun {
     pub fn halve_step(&mut self, context: &DeviceContext, scene: &Scene, volume: &Volume) -> Result<()> {
         self.plan.step *= 0.5;
         self.gathered.moving = None;
+        self.gathered.will_change();
         self.pace = Pace::new(context.device.info(), self.longest / f64::from(self.plan.step), None);
         for (layer, step) in self.gathered.layers.iter_mut().zip([2.0 * self.plan.step, self.plan.step]) {
             (layer.samples, layer.step) = (0, step);
@@ -180,6 +181,7 @@ impl ViewRun {
         let known = ray_ms.map(|ray_ms| motion.least(rays, ray_ms, self.plan.stepless));
         let (lowered, step_loss) = known.unwrap_or_default();
         let step = self.plan.step;
+        self.gathered.will_change();
         let before = self.gathered.moving.take();
         if !lowered.is_none() {
             self.gathered.moving = Some(Moving::new(context, scene, volume, step, lowered, step_loss, before)?);
@@ -242,6 +244,7 @@ impl ViewRun {
 
     /// Chooses the next pass.
     fn begin(&mut self, context: &DeviceContext) -> Result<Pass> {
+        self.gathered.will_change();
         let pass = self.gathered.next_pass();
         let adaptive = pass == Pass::Main && self.random.is_some_and(|r| r.adaptive);
         self.gathered.layer_mut(pass).choose_tiles(context, adaptive)?;
