@@ -20,7 +20,7 @@ use cloudchamber::study::bench::{Bench, Reads, Run};
 use cloudchamber::study::measure::{Measured, measure};
 use cloudchamber::study::record::{Choice, Line, Point, Record};
 use cloudchamber::study::shelf::{PEERS, Shelf};
-use cloudchamber::study::{fit, machine};
+use cloudchamber::study::{ERRORS, fit, machine};
 use cloudchamber::volume::{RawQuery, Volume, Voxels};
 use scenes::{FRAMES, SIDE, median, modes, synthetic};
 use serde_json::{Value, json};
@@ -184,13 +184,7 @@ fn compare(bench: &Bench, shelf: &Shelf, subject: &Subject, mode: &str, paramete
     let ours = lines[..2].iter().flat_map(|l| l.points.iter().map(move |p| (l, p)));
     let best = ours.filter(|(_, p)| p.error.rmse <= vtk.rmse).min_by(|a, b| a.1.device_ms.total_cmp(&b.1.device_ms));
     let best = best.map(|(line, point)| (format!("{}, {} voxels a step", line.name, point.at), point.clone()));
-    let choice = Choice {
-        bound: vtk.rmse,
-        setting: best.as_ref().map(|(setting, _)| setting.clone()),
-        device_ms: best.as_ref().map(|(_, p)| p.device_ms),
-        rmse: best.as_ref().map(|(_, p)| p.error.rmse),
-    };
-    shelf.put(&finish(bench, subject, mode, lines, choice)).unwrap();
+    shelf.put(&finish(bench, subject, mode, lines)).unwrap();
     let Some((setting, best)) = best else {
         return println!("| {} | {mode} | {:.0} ms | {:.2} % | none |", subject.name, 1e3 * vtk_s, 100.0 * vtk.rmse);
     };
@@ -207,11 +201,26 @@ fn compare(bench: &Bench, shelf: &Shelf, subject: &Subject, mode: &str, paramete
     );
 }
 
-fn finish(bench: &Bench, subject: &Subject, mode: &str, mut lines: Vec<Line>, choice: Choice) -> Record {
+fn finish(bench: &Bench, subject: &Subject, mode: &str, mut lines: Vec<Line>) -> Record {
     let all: Vec<(f64, f64)> = lines.iter().flat_map(|l| &l.points).map(|p| (p.device_ms, p.error.rmse)).collect();
     for (point, front) in lines.iter_mut().flat_map(|l| &mut l.points).zip(fit::pareto(&all)) {
         point.front = front;
     }
+    let ours: Vec<(String, &Point)> = lines[..2]
+        .iter()
+        .flat_map(|l| l.points.iter().map(move |p| (format!("{}, {} {}", l.name, l.of, p.at), p)))
+        .collect();
+    let times: Vec<(f64, f64)> = ours.iter().map(|(_, p)| (p.device_ms, p.error.rmse)).collect();
+    let choice = |bound: f64| {
+        let found = fit::fastest_within(&times, bound).map(|i| &ours[i]);
+        Choice {
+            bound,
+            setting: found.map(|(setting, _)| setting.clone()),
+            device_ms: found.map(|(_, p)| p.device_ms),
+            rmse: found.map(|(_, p)| p.error.rmse),
+        }
+    };
+    let equal_error = ERRORS.map(choice).to_vec();
     let [x, y, z] = subject.dims;
     Record {
         name: format!("{PEERS}{}_{mode}", subject.name),
@@ -224,7 +233,7 @@ fn finish(bench: &Bench, subject: &Subject, mode: &str, mut lines: Vec<Line>, ch
         quick: false,
         machine: machine(bench),
         lines,
-        equal_error: vec![choice],
+        equal_error,
         equal_time: Vec::new(),
     }
 }

@@ -17,17 +17,19 @@ use crate::study::stability::Stability;
 
 const ROOT: &str = "/v1/studies";
 
-/// Of whom comparisons with another program are.
-const WHEN: &str = "a volume, and VTK at hand";
-const CHOOSE: &str = "the longest step that is wrong by no more than VTK's picture: the table says what it takes";
+/// Of whom comparisons with another program are, by whether the picture is lit, and what to choose then.
+const WHEN: [&str; 2] = ["a volume, and VTK at hand", "a volume to be lit, and VTK at hand"];
+const CHOOSE: &str = "the longest step that is wrong by no more than VTK's picture, which the chart has";
 
 /// `GET /v1/studies`.
 pub(super) async fn list(State(app): State<App>) -> Result<Json<Value>> {
     let listed = tokio::task::spawn_blocking(move || {
         let shelf = &app.studies;
         let peers = shelf.names().into_iter().filter(|name| name.starts_with(PEERS));
-        let cases =
-            CASES.iter().map(|c| (c.name.to_owned(), c.when, c.choose)).chain(peers.map(|name| (name, WHEN, CHOOSE)));
+        let cases = CASES.iter().map(|c| (c.name.to_owned(), c.when, c.choose)).chain(peers.map(|name| {
+            let when = WHEN[usize::from(name.ends_with("_shaded"))];
+            (name, when, CHOOSE)
+        }));
         let cases: Vec<Value> = cases.filter_map(|(name, when, choose)| describe(&name, when, choose, shelf)).collect();
         json!({"studies": cases, "stability": app.studies.record(STABILITY).as_ref().map(describe_stability),
             "planner": app.studies.record(PLANNER).as_ref().map(describe_planner)})

@@ -26,7 +26,7 @@ mod table;
 pub mod verdict;
 
 pub use cases::CASES;
-pub use run::{machine, study};
+pub use run::{ERRORS, machine, study};
 pub use table::table;
 
 use serde_json::{Value, json};

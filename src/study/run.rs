@@ -14,7 +14,7 @@ use crate::error::Result;
 use crate::power_law::PowerLaw;
 
 /// The errors of the table of the fastest settings.
-const ERRORS: [f64; 3] = [0.1, 0.01, 0.001];
+pub const ERRORS: [f64; 3] = [0.1, 0.01, 0.001];
 /// The times of the table of the best settings, device milliseconds.
 const TIMES_MS: [f64; 4] = [1.0, 10.0, 100.0, 1000.0];
 
