@@ -12,7 +12,6 @@ mod common;
 mod scenes;
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use clap::Parser;
 use cloudchamber::config::{DeviceArgs, Limits};
@@ -22,7 +21,7 @@ use cloudchamber::study::record::{Choice, Line, Point, Record};
 use cloudchamber::study::shelf::{PEERS, Shelf};
 use cloudchamber::study::{ERRORS, fit, machine};
 use cloudchamber::volume::{RawQuery, Volume, Voxels};
-use scenes::{FRAMES, SIDE, median, modes, synthetic};
+use scenes::{FRAMES, SIDE, list, median, modes, synthetic, vtk};
 use serde_json::{Value, json};
 
 /// Steps that are tried, in voxels.
@@ -69,15 +68,11 @@ impl Subject {
         1.8 * sides.fold(0.0, f64::max)
     }
 
-    fn list<T: ToString>(of: [T; 3]) -> String {
-        of.map(|v| v.to_string()).join(",")
-    }
-
     fn upload(&self, bench: &Bench) -> Value {
         let query = RawQuery {
-            dims: Some(Self::list(self.dims)),
+            dims: Some(list(self.dims)),
             r#type: Some("u8".into()),
-            spacing: Some(Self::list(self.spacing)),
+            spacing: Some(list(self.spacing)),
             endian: None,
         };
         json!({"id": bench.store().insert(self.bytes.clone(), &self.name, query.parse().unwrap()).unwrap().1})
@@ -105,15 +100,7 @@ impl Subject {
         let folder = tempfile::tempdir().unwrap();
         let [raw, out] = ["volume.raw", "out.rgb"].map(|name| folder.path().join(name));
         std::fs::write(&raw, &self.bytes).unwrap();
-        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let output = Command::new(root.join("target/bench-venv/bin/python"))
-            .arg(root.join("benches/vtk_error.py"))
-            .arg(&raw)
-            .args([Self::list(self.dims), Self::list(self.spacing), self.distance().to_string(), mode.to_owned()])
-            .arg(&out)
-            .output()
-            .ok()?;
-        let seconds = serde_json::from_slice(&output.stdout).ok()?;
+        let seconds = vtk(&raw, self.dims, self.spacing, self.distance(), mode, Some(&out))?;
         let luminance =
             |p: &[u8]| (0.2126 * f64::from(p[0]) + 0.7152 * f64::from(p[1]) + 0.0722 * f64::from(p[2])) / 255.0;
         Some((seconds, std::fs::read(&out).unwrap().chunks_exact(3).map(luminance).collect()))

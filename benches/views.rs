@@ -7,16 +7,7 @@
 mod common;
 mod scenes;
 
-use std::process::Command;
-
-use scenes::{Client, FRAMES, SIDE, median, modes, scene, synthetic};
-
-fn vtk(volume: &std::path::Path, mode: &str) -> Option<f64> {
-    let python = concat!(env!("CARGO_MANIFEST_DIR"), "/target/bench-venv/bin/python");
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/vtk_synth.py");
-    let output = Command::new(python).args([script.as_ref(), volume.as_os_str()]).args(["6", mode]).output().ok()?;
-    serde_json::from_slice(&output.stdout).ok()
-}
+use scenes::{Client, FRAMES, SIDE, median, modes, scene, synthetic, vtk};
 
 fn main() {
     let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
@@ -41,7 +32,7 @@ fn main() {
         // In turns, so that a noisy neighbour troubles both.
         for _ in 0..3 {
             ours.extend((0..FRAMES).map(|i| client.frame(&scene(&volume, i, technique, &parameters))));
-            theirs.extend((!no_vtk).then(|| vtk(&path, mode)).flatten());
+            theirs.extend((!no_vtk).then(|| vtk(&path, [SIDE; 3], [2.0 / SIDE as f64; 3], 3.6, mode, None)).flatten());
         }
         if let Some(folder) = std::env::var_os("PICTURES") {
             std::fs::write(std::path::Path::new(&folder).join(format!("{mode}.png")), &ours[1].png).unwrap();

@@ -7,7 +7,7 @@ root="${1:?a folder for the root of Debian 13}"
 cargo build --release --quiet
 command -v debootstrap >/dev/null || apt-get install -y --no-install-recommends debootstrap
 mirror="$(grep -rhoE 'https?://[^ ]+/debian/?' /etc/apt/sources.list /etc/apt/sources.list.d 2>/dev/null | grep -v security | head -1)"
-[ -e "$root/etc/debian_version" ] || debootstrap --variant=minbase trixie "$root" "${mirror:-http://deb.debian.org/debian}"
+[ -e "$root/etc/debian_version" ] || debootstrap --variant=minbase trixie "$root" $mirror
 for m in proc sys dev; do mount --rbind "/$m" "$root/$m" && mount --make-rslave "$root/$m"; done
 trap 'for m in dev sys proc; do umount -R "$root/$m"; done' EXIT
 cp /etc/resolv.conf "$root/etc/"

@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "each benchmark uses its own part of this")]
 
+use std::path::Path;
+use std::process::Command;
 use std::time::Instant;
 
 use serde_json::{Value, json};
@@ -30,7 +32,28 @@ pub fn synthetic(side: usize) -> Vec<u8> {
     voxels
 }
 
-/// What is measured: its name here and in `vtk_synth.py`, the technique, its parameters.
+/// Numbers with commas between them.
+pub fn list<T: ToString>(of: [T; 3]) -> String {
+    of.map(|v| v.to_string()).join(",")
+}
+
+/// Seconds of a frame of VTK's, of a volume of bytes seen from a distance; its first picture goes to `out`. None without VTK.
+pub fn vtk(
+    raw: &Path,
+    dims: [usize; 3],
+    spacing: [f64; 3],
+    distance: f64,
+    mode: &str,
+    out: Option<&Path>,
+) -> Option<f64> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut command = Command::new(root.join("target/bench-venv/bin/python"));
+    command.arg(root.join("benches/vtk_views.py")).arg(raw).args([list(dims), list(spacing), distance.to_string()]);
+    let output = command.args(["6", mode]).args(out).output().ok()?;
+    serde_json::from_slice(&output.stdout).ok()
+}
+
+/// What is measured: its name here and in `vtk_views.py`, the technique, its parameters.
 pub fn modes() -> Vec<(&'static str, &'static str, Value)> {
     // VTK's opacities are for four voxels; it ends a ray when 0.8 % gets through and takes its samples without jitter.
     let unit = 4.0 * 2.0 / SIDE as f64;
