@@ -12,8 +12,10 @@
 // One load wherever it lies; of vload4's four bytes the compiler makes several.
 typedef struct __attribute__((packed)) { int word; } UnalignedInt;
 typedef struct __attribute__((packed)) { long word; } UnalignedLong;
+typedef struct __attribute__((packed)) { float4 four; } UnalignedFloat4;
 #define INT_AT(from) ((global const UnalignedInt *)(from))->word
 #define LONG_AT(from) ((global const UnalignedLong *)(from))->word
+#define FOUR_AT(from) ((global const UnalignedFloat4 *)(from))->four
 
 static inline int4 load_rows(global const uchar *from, int row) {
     return (int4)(INT_AT(from), INT_AT(from + row), INT_AT(from + 2 * row), INT_AT(from + 3 * row));
@@ -79,7 +81,7 @@ static inline Block block_from(constant const View *view, global const uchar *fr
     b.rows = (Int)(rows), b.bytes = (Int)(bytes);
 #elif VOXEL == VOXEL_F32
     for (int z = 0; z < 4; z++) {
-        #define ROW(y) vload4(0, (global const float *)(from + z * sheet + (y) * row))
+        #define ROW(y) FOUR_AT(from + z * sheet + (y) * row)
         b.sheet[z] = (Real)(ROW(0), ROW(1), ROW(2), ROW(3));
         #undef ROW
     }
@@ -97,19 +99,19 @@ static inline Block block_at(constant const View *view, VOLUME voxels, const Blo
 }
 
 #if VOXEL == VOXEL_F32
-// One of the block's 64 voxels a lane.
-static inline Real block_voxel(const Block *b, Int at) {
-    Real low = __builtin_ia32_vpermi2varps512(b->sheet[0], at, b->sheet[1]), high = __builtin_ia32_vpermi2varps512(b->sheet[2], at, b->sheet[3]);
-    return select(low, high, at << 26);
-}
-
-// What lies between them, by the arithmetic of inner_raw.
+// What lies between them, by the arithmetic of inner_raw. Of the three sheets that the lanes' nearer voxels are on a permutation reads two,
+// and another, in the lanes that are there, the third; so for the farther ones.
 static inline Real block_raw(const Block *b, Real3 p) {
     Int ix = to_int(p.x), iy = to_int(p.y), iz = to_int(p.z), at = (iz << 4) + (iy << 2) + ix + b->first;
     Real fx = p.x - to_real(ix), fy = p.y - to_real(iy), fz = p.z - to_real(iz);
-    #define LINE(n) ({ Real a = block_voxel(b, at + (n)); mad(block_voxel(b, at + (n) + 1) - a, fx, a); })
-    Real near = LINE(0), low = LINE(4), far = LINE(16), deep = LINE(20);
+    Mask third = MASK((at & 0x20) != 0), first = MASK((at & 0x30) == 0);
+    #define NEAR(n) select(__builtin_ia32_vpermi2varps512(b->sheet[0], at + (n), b->sheet[1]), __builtin_ia32_permvarsf512(b->sheet[2], at + (n)), third)
+    #define FAR(n) select(__builtin_ia32_vpermi2varps512(b->sheet[2], at + (n), b->sheet[3]), __builtin_ia32_permvarsf512(b->sheet[1], at + (n)), first)
+    #define LINE(CORNER, n) ({ Real a = CORNER(n); mad(CORNER((n) + 1) - a, fx, a); })
+    Real near = LINE(NEAR, 0), low = LINE(NEAR, 4), far = LINE(FAR, 16), deep = LINE(FAR, 20);
     #undef LINE
+    #undef FAR
+    #undef NEAR
     Real front = mad(low - near, fy, near), back = mad(deep - far, fy, far);
     return mad(back - front, fz, front);
 }

@@ -177,16 +177,23 @@ static inline Int gather_words(global const uchar *base, Int byte_offset) {
 #endif
 #endif
 
-// The two words of the pair `index` a lane: on AVX-512 with half the loads of two gathers.
-static inline void gather_pairs(global const uchar *pairs, Int index, Int *first, Int *second) {
+// Two words side by side a lane, from base + byte_offset: half the loads of two gathers.
+static inline void gather_pairs(global const uchar *base, Int byte_offset, Int *first, Int *second) {
 #if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_gathersiv8di)
-    long8 low = __builtin_ia32_gathersiv8di((long8)(0), (const void *)(size_t)pairs, index.lo, (char)-1, 8);
-    long8 high = __builtin_ia32_gathersiv8di((long8)(0), (const void *)(size_t)pairs, index.hi, (char)-1, 8);
+    long8 low = __builtin_ia32_gathersiv8di((long8)(0), (const void *)(size_t)base, byte_offset.lo, (char)-1, 1);
+    long8 high = __builtin_ia32_gathersiv8di((long8)(0), (const void *)(size_t)base, byte_offset.hi, (char)-1, 1);
     *first = (Int)(as_int16(low).even, as_int16(high).even);
     *second = (Int)(as_int16(low).odd, as_int16(high).odd);
+#elif LANES == 8 && defined(__AVX2__) && __has_builtin(__builtin_ia32_gatherd_q256)
+    // A shuffle takes words of each half of two registers in turn: it puts lanes that come in this order right.
+    int4 from_low = byte_offset.s0145, from_high = byte_offset.s2367;
+    int8 low = as_int8(__builtin_ia32_gatherd_q256((long4)(0), (const long *)(size_t)base, from_low, (long4)(-1), 1));
+    int8 high = as_int8(__builtin_ia32_gatherd_q256((long4)(0), (const long *)(size_t)base, from_high, (long4)(-1), 1));
+    *first = __builtin_shufflevector(low, high, 0, 2, 8, 10, 4, 6, 12, 14);
+    *second = __builtin_shufflevector(low, high, 1, 3, 9, 11, 5, 7, 13, 15);
 #else
-    *first = gather_words(pairs, index * 8);
-    *second = gather_words(pairs + 4, index * 8);
+    *first = gather_words(base, byte_offset);
+    *second = gather_words(base + 4, byte_offset);
 #endif
 }
 

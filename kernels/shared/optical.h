@@ -10,7 +10,7 @@ typedef struct { Int word, red_green; } Entry;
 
 static inline Entry entry_at(global const uchar *table, Int index) {
     Entry e;
-    gather_pairs(table, index, &e.word, &e.red_green);
+    gather_pairs(table, index << 3, &e.word, &e.red_green);
     return e;
 }
 

@@ -116,7 +116,9 @@ static inline Real trilinear_raw(constant const View *view, VOLUME voxels, Real3
 // Two neighbours in x, one load where their bits fit in a word: loads, not arithmetic, are what a sample costs.
 static inline Real lerp_x(global const uchar *voxels, Int byte_offset, Real f) {
 #if VOXEL == VOXEL_F32
-    Real a = as_Real(gather_words(voxels, byte_offset)), b = as_Real(gather_words(voxels, byte_offset + 4));
+    Int first, second;
+    gather_pairs(voxels, byte_offset, &first, &second);
+    Real a = as_Real(first), b = as_Real(second);
 #else
     Int pair = gather_words(voxels, byte_offset);
 #if VOXEL == VOXEL_U8

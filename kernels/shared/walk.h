@@ -52,7 +52,9 @@ static inline Corners corners_at(constant const View *view, VOLUME voxels, Real3
 // The raw values of two neighbours in x.
 static inline void pair_raw(global const uchar *voxels, Int at, Real *a, Real *b) {
 #if VOXEL == VOXEL_F32
-    *a = as_Real(gather_words(voxels, at)), *b = as_Real(gather_words(voxels, at + 4));
+    Int first, second;
+    gather_pairs(voxels, at, &first, &second);
+    *a = as_Real(first), *b = as_Real(second);
 #else
     Int pair = gather_words(voxels, at);
 #if VOXEL == VOXEL_U8
