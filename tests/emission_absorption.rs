@@ -20,3 +20,5 @@ mod reference;
 mod scenes;
 #[path = "emission_absorption/styles.rs"]
 mod styles;
+#[path = "emission_absorption/words.rs"]
+mod words;

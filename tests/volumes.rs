@@ -15,5 +15,7 @@ mod levels;
 mod scans;
 #[path = "volumes/stores.rs"]
 mod stores;
+#[path = "volumes/words.rs"]
+mod words;
 #[path = "volumes/writers.rs"]
 mod writers;

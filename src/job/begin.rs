@@ -101,8 +101,18 @@ impl Live {
 
     pub(super) fn begin_view(&mut self, context: &mut DeviceContext, volume: Arc<Volume>) -> Result<()> {
         let Some(scene) = &self.scene else { return Ok(()) };
-        let plan = scene.view().plan(&volume)?;
-        self.run_view(context, volume, plan)
+        if let Some(field) = &self.field {
+            let mut progress = self.job.lock();
+            progress.field = Some(volume.clone());
+            progress.complete_field = field.is_done().then(|| volume.clone()).or(progress.complete_field.take());
+        }
+        let words = scene.view().resolution(&volume)?.and_then(|resolution| volume.words(resolution));
+        let mut plan = scene.view().plan(words.as_ref().unwrap_or(&volume))?;
+        if words.is_some() {
+            let half = 0.5 * volume.word_step();
+            plan.reasons.push(format!("floats are taken as words of 16 bits: values are off by {half:.1e} at most"));
+        }
+        self.run_view(context, words.unwrap_or(volume), plan)
     }
 
     pub(super) fn run_view(&mut self, context: &mut DeviceContext, volume: Arc<Volume>, plan: ViewPlan) -> Result<()> {
@@ -130,12 +140,6 @@ impl Live {
             progress.warnings = warnings(&volume, scene);
             let simulated = self.result.as_ref().and_then(|r| r["warnings"].as_array());
             progress.warnings.extend(simulated.into_iter().flatten().cloned());
-            if self.field.is_some() {
-                progress.field = Some(volume.clone());
-            }
-            if self.field.as_ref().is_some_and(FieldRun::is_done) {
-                progress.complete_field = Some(volume.clone());
-            }
         }
         self.volume = Some(volume);
         self.view = Some(view);

@@ -75,13 +75,13 @@ pub(super) fn source_of(variant: &Variant) -> Result<Source> {
     sources().find(|s| s.kernel == variant.kernel).ok_or_else(missing)
 }
 
-/// What the first picture needs, most likely: the first technique on floats, as built-in volumes have, and on bytes, and
+/// What the first picture needs, most likely: the first technique on words, as it takes the floats of built-in volumes, and on bytes, and
 /// what films are developed by.
 pub(super) fn first() -> Vec<Variant> {
     let views = technique::ALL.first().map_or(Vec::new(), |t| ((t.source)().variants)());
     let of =
         |voxel| views.iter().find(move |v| v.voxel == Some(voxel)).copied().into_iter().chain(cells::needed(voxel));
-    of(VoxelType::F32).chain(of(VoxelType::U8)).chain((develop::source().variants)()).collect()
+    of(VoxelType::U16).chain(of(VoxelType::U8)).chain((develop::source().variants)()).collect()
 }
 
 /// What is compiled ahead, the likeliest first.

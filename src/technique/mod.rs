@@ -144,6 +144,13 @@ impl Random {
 
 /// A view with valid parameters.
 pub trait View: Send + Sync {
+    /// A difference of values that plays no part in the picture; none where all do. Where words are finer, floats are taken as words.
+    ///
+    /// # Errors
+    /// As [`View::plan`].
+    fn resolution(&self, _volume: &Volume) -> Result<Option<f64>> {
+        Ok(None)
+    }
     /// What to run for `volume`.
     ///
     /// # Errors

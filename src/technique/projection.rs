@@ -261,6 +261,13 @@ impl View for Parameters {
         coarse_step(self.step_voxels).filter(|_| !self.walked()).into_iter().collect()
     }
 
+    /// Half an entry of the table of colours, where samples are taken and not written to the film as they are.
+    fn resolution(&self, volume: &Volume) -> Result<Option<f64>> {
+        let plain = !self.walked() && self.interpolation() == Interpolation::Trilinear && self.output != Output::Value;
+        let [per_value, _] = self.window(volume)?.scale_and_offset();
+        Ok(plain.then(|| 0.5 / f64::from(per_value).abs()))
+    }
+
     fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
         let wanted = features(self.interpolation(), self.walked());
         let features = FEATURES.iter().find(|f| **f == wanted).unwrap_or(&FEATURES[0]);

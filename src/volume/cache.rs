@@ -53,6 +53,6 @@ impl Cache {
 
     /// Bytes of all voxels held, with those of coarser levels.
     pub fn bytes(&self) -> u64 {
-        self.entries.iter().map(|(_, volume)| volume.bytes() + volume.level_bytes()).sum()
+        self.entries.iter().map(|(_, volume)| volume.bytes_in_all()).sum()
     }
 }

@@ -57,38 +57,48 @@ impl Volume {
             Voxels::U16(_) => Voxels::U16(values.iter().map(|v| v.round() as u16).collect()),
             Voxels::F32(_) => Voxels::F32(values),
         };
-        let non_finite = match &voxels {
-            Voxels::F32(values) => values.iter().filter(|v| v.is_nan()).count() as u64,
-            _ => 0,
-        };
         let scale = DVec3::from_array([0, 1, 2].map(|a| self.dims()[a] as f64 / dims[a] as f64));
         let DAffine3 { matrix3, translation } = self.world_from_index;
         let parts = NewVolume {
             dims,
             spacing: [0, 1, 2].map(|a| self.spacing()[a] * scale[a]),
+            name: format!("{}, level {level}", self.name()),
+            ..self.parts_with(voxels)
+        };
+        let world_from_index = DAffine3 { matrix3: matrix3 * DMat3::from_diagonal(scale), translation };
+        Self { bright_mean: OnceLock::from(self.bright_mean()), ..self.derived(parts, world_from_index) }
+    }
+
+    /// What a volume that is made of this one has of it: all but its notes and what its file says of its place.
+    pub(super) fn parts_with(&self, voxels: Voxels) -> NewVolume {
+        NewVolume {
             linear: None,
             voxels,
-            name: format!("{}, level {level}", self.name()),
+            name: self.name().to_owned(),
             format: self.format().to_owned(),
             file_affine: None,
             unit: self.unit().to_owned(),
             notes: Vec::new(),
             ..self.parts
-        };
-        Self {
-            parts,
-            world_from_index: DAffine3 { matrix3: matrix3 * DMat3::from_diagonal(scale), translation },
-            range: self.range,
-            non_finite,
-            histogram: self.histogram.clone(),
-            bright_mean: OnceLock::from(self.bright_mean()),
-            levels: Levels::default(),
         }
     }
 
-    /// Bytes of the levels that were made.
-    pub(super) fn level_bytes(&self) -> u64 {
-        self.levels.iter().filter_map(OnceLock::get).map(|level| level.bytes()).sum()
+    /// A volume in the same box with the same range and histogram.
+    pub(super) fn derived(&self, parts: NewVolume, world_from_index: DAffine3) -> Self {
+        let non_finite = match &parts.voxels {
+            Voxels::F32(values) => values.iter().filter(|v| v.is_nan()).count() as u64,
+            _ => 0,
+        };
+        let (bright_mean, levels, words) = Default::default();
+        let (range, histogram) = (self.range, self.histogram.clone());
+        Self { parts, world_from_index, range, non_finite, histogram, bright_mean, levels, words }
+    }
+
+    /// Bytes of the volume, of the levels that were made of it, and of all their words.
+    pub(super) fn bytes_in_all(&self) -> u64 {
+        let words = self.words.get().and_then(Option::as_ref).map_or(0, |words| words.bytes());
+        let levels = self.levels.iter().filter_map(OnceLock::get);
+        self.bytes() + words + levels.map(|level| level.bytes_in_all()).sum::<u64>()
     }
 }
 

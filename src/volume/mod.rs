@@ -5,7 +5,7 @@
 //! world with its centre at the origin. World axes of a scan are NIfTI's: x right, y anterior, z superior.
 //!
 //! **Values** are `raw · slope + inter`; voxels stay in the type of their file, so that a byte volume takes a byte a
-//! voxel on the device too.
+//! voxel on the device too; floats are taken as words of 16 bits where a view needs no more (`words.rs`).
 
 mod bright;
 pub mod builtin;
@@ -25,6 +25,7 @@ mod samples;
 mod store;
 mod store_files;
 mod voxels;
+mod words;
 
 pub use info::VolumeInfo;
 pub use levels::MOST_LEVEL;
@@ -80,6 +81,7 @@ pub struct Volume {
     histogram: Histogram,
     bright_mean: OnceLock<f64>,
     levels: levels::Levels,
+    words: words::Words,
 }
 
 impl Volume {
@@ -113,8 +115,8 @@ impl Volume {
             None => [0.0; 2],
         };
         let histogram = Histogram::new(&parts.voxels, parts.slope, parts.inter, range);
-        let (bright_mean, levels) = Default::default();
-        Ok(Self { parts, world_from_index, range, non_finite, histogram, bright_mean, levels })
+        let (bright_mean, levels, words) = Default::default();
+        Ok(Self { parts, world_from_index, range, non_finite, histogram, bright_mean, levels, words })
     }
 
     /// Voxels along x, y, z.

@@ -31,7 +31,7 @@ pub(super) fn over_ranges<R: Send>(count: usize, voxels: usize, work: impl Fn(Ra
 }
 
 /// Fills `slices` of equal length, each by `fill(index of the slice, slice)`.
-pub(super) fn over_slices(values: &mut [f32], slice_len: usize, fill: impl Fn(usize, &mut [f32]) + Sync) {
+pub(super) fn over_slices<T: Send>(values: &mut [T], slice_len: usize, fill: impl Fn(usize, &mut [T]) + Sync) {
     let slices = values.len() / slice_len.max(1);
     let step = slices.div_ceil(threads_for(values.len())).max(1);
     let fill = &fill;

@@ -90,3 +90,25 @@ fn the_example_and_every_default_show_something() {
         }
     }
 }
+
+#[test]
+fn a_greatest_value_is_shown_from_words_and_written_from_floats() {
+    let house = House::shared();
+    let volume = house.floats([31, 33, 35], |x, y, z| (7.0 * x).sin() + (3.0 * y * z).cos());
+    let of = |own: Value| {
+        let job = house.finish(&json!({
+            "technique": "projection", "volume": volume, "image": {"width": 90, "height": 80}, "budget": {"samples": 1}, "projection": own
+        }));
+        (job.resource()["plan"]["reasons"].to_string().contains("words of 16 bits"), house.film_of(&job))
+    };
+    let [(words, shown), (no_words, values)] = [of(json!({})), of(json!({"output": "value"}))];
+    assert!(words && !no_words);
+    // Grey is the value's part of the range in sRGB, and the film has linear light.
+    let [low, high] = house.store.get(volume["id"].as_str().unwrap()).unwrap().range();
+    let pixels = shown.main.mean.chunks_exact(4).zip(values.main.mean.chunks_exact(4));
+    for (grey, value) in pixels.filter(|(grey, _)| grey[3] == 1.0) {
+        let part = (f64::from(value[0]) - low) / (high - low);
+        let linear = if part > 0.04045 { ((part + 0.055) / 1.055).powf(2.4) } else { part / 12.92 };
+        assert!((f64::from(grey[0]) - linear).abs() < 5e-4, "{grey:?} for {part}");
+    }
+}

@@ -123,6 +123,16 @@ impl View for Parameters {
         self.labels()
     }
 
+    /// Half an entry of the table. The plain reference form, and what is of another order or style, take values as they are.
+    fn resolution(&self, volume: &Volume) -> Result<Option<f64>> {
+        let plain = [plain(Interpolation::Trilinear, false), plain(Interpolation::Trilinear, true)];
+        if !plain.contains(self.features()) {
+            return Ok(None);
+        }
+        let [low, high] = self.transfer_function(volume)?.0.domain();
+        Ok(Some(0.5 * (high - low) / TABLE_SIZE as f64))
+    }
+
     fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
         let skip = self.empty_space_skipping && self.order == "front_to_back";
         let (opaque, named) = match &self.regions {

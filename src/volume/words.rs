@@ -1,0 +1,51 @@
+//! A volume of floats in whole numbers of 16 bits: half the memory, and kernels weigh them twice as fast.
+//!
+//! Word w stands for low + w (high − low) / 65535, so a value is off by half a step, (high − low) / 131070, at most, and so is what
+//! lies between values. Statistics are the volume's own.
+
+use std::sync::{Arc, OnceLock};
+
+use super::parallel::over_slices;
+use super::{NewVolume, Volume, Voxels};
+
+/// Steps of the words over the range.
+const STEPS: f64 = 65535.0;
+
+/// The volume in words once it was asked for; none where it has none.
+pub(super) type Words = OnceLock<Option<Arc<Volume>>>;
+
+impl Volume {
+    /// The volume in words, where it has floats, all of them finite, and words whose steps are at most `resolution`, a difference of
+    /// values. Made when it is first asked for and kept as long as the volume.
+    pub fn words(&self, resolution: f64) -> Option<Arc<Self>> {
+        let Voxels::F32(values) = self.voxels() else { return None };
+        let [low, high] = self.range;
+        let fine = self.non_finite == 0 && high > low && self.word_step() <= resolution;
+        fine.then(|| self.words.get_or_init(|| self.in_words(values)).clone()).flatten()
+    }
+
+    /// The difference of the values of two neighbouring words.
+    pub fn word_step(&self) -> f64 {
+        (self.range[1] - self.range[0]) / STEPS
+    }
+
+    fn in_words(&self, values: &[f32]) -> Option<Arc<Self>> {
+        let raw = self.range.map(|value| (value - self.inter()) / self.slope());
+        let (low, high) = (raw[0].min(raw[1]), raw[0].max(raw[1]));
+        let (scale, slope) = ((STEPS / (high - low)) as f32, self.slope() * (high - low) / STEPS);
+        if !(scale.is_normal() && slope.is_normal()) {
+            return None;
+        }
+        let (first, slice) = (low as f32, self.dims()[0] * self.dims()[1]);
+        let mut words = vec![0u16; values.len()];
+        over_slices(&mut words, slice, |z, words| {
+            for (word, value) in words.iter_mut().zip(&values[z * slice..]) {
+                // The cast saturates: what rounding takes past an end is the end.
+                *word = ((value - first) * scale + 0.5) as u16;
+            }
+        });
+        let inter = self.inter() + self.slope() * low;
+        let parts = NewVolume { slope, inter, notes: self.notes().to_vec(), ..self.parts_with(Voxels::U16(words)) };
+        Some(Arc::new(self.derived(parts, self.world_from_index)))
+    }
+}
