@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 use opencl3::command_queue::CommandQueue;
 use opencl3::context::Context;
 use opencl3::kernel::Kernel;
-use opencl3::memory::{Buffer as ClBuffer, CL_MEM_READ_WRITE, ClMem, Image};
+use opencl3::memory::{Buffer as ClBuffer, CL_MEM_COPY_HOST_PTR, CL_MEM_READ_WRITE, ClMem, Image};
 use opencl3::program::Program;
 use opencl3::types::{CL_BLOCKING, cl_mem, cl_uchar};
 
@@ -26,6 +26,9 @@ pub use select::{DeviceInfo, NO_DEVICE, list, select};
 
 use crate::error::{Error, Result};
 use program::{Source, Variant};
+
+/// Uploads below so many bytes are copied where their padding is added.
+const SMALL: usize = 1 << 20;
 
 /// How a device is chosen and where its compiled kernels are kept.
 #[derive(Debug, Clone)]
@@ -211,6 +214,14 @@ impl Device {
         Ok(Buffer { memory: Memory::Bytes(cl("allocating a buffer", memory)?), bytes })
     }
 
+    /// A buffer that holds `data`, which is not empty: without a command in the queue, of which each takes as long as some hundred kilobytes.
+    fn allocate_with(&self, data: &mut [u8]) -> Result<Buffer> {
+        let (flags, host) = (CL_MEM_READ_WRITE | CL_MEM_COPY_HOST_PTR, data.as_mut_ptr().cast());
+        // SAFETY: `host` points to as many bytes as are asked for, and they are copied before the call returns.
+        let memory = unsafe { ClBuffer::create(&self.context, flags, data.len(), host) };
+        Ok(Buffer { memory: Memory::Bytes(cl("allocating a buffer", memory)?), bytes: data.len() })
+    }
+
     /// A buffer of `bytes` bytes, of what was written before or not at all: `room` where that is as large. Memory that has been in use is there
     /// at once; of new memory the system hands out every page when it is first touched.
     ///
@@ -225,6 +236,11 @@ impl Device {
     /// # Errors
     /// As [`Device::allocate`].
     pub fn upload(&self, data: &[u8], padding: usize) -> Result<Buffer> {
+        if data.len() < SMALL {
+            let mut padded = [data, &vec![0; padding]].concat();
+            padded.resize(padded.len().max(1), 0);
+            return self.allocate_with(&mut padded);
+        }
         let mut buffer = self.allocate(data.len() + padding)?;
         self.write(&mut buffer, 0, data)?;
         self.write(&mut buffer, data.len(), &vec![0; padding])?;

@@ -1,12 +1,12 @@
 //! What all jobs on the device thread share: the device, the volumes on it, what is compiled.
 
-use std::cell::RefCell;
 use std::collections::HashMap;
 use std::rc::Rc;
 use std::sync::{Arc, Weak};
 use std::time::{Duration, Instant};
 
 use super::compile::Compiler;
+use super::device_volume::DeviceVolume;
 use super::kernels::{self, Kernels};
 use super::warm::{first_kernels, is_cached, warm};
 use crate::device::cells::Cells;
@@ -17,51 +17,6 @@ use crate::volume::Volume;
 
 /// Device memory for volumes that no job uses just now.
 const IDLE_VOLUME_BYTES: usize = 1 << 30;
-
-/// A volume on the device.
-pub(super) struct DeviceVolume {
-    pub voxels: Buffer,
-    pub cells: Cells,
-    /// Distances to what views wanted to see of it, newest last: a client that turns a volume asks the same again and again.
-    distances: RefCell<Vec<(DistancesKey, Distances)>>,
-}
-
-/// Intervals of raw values and the overshoot, as bits.
-type DistancesKey = (Vec<[u32; 2]>, u32);
-
-/// Distances that are kept for a volume.
-const KEPT_DISTANCES: usize = 4;
-
-impl DeviceVolume {
-    fn bytes(&self) -> usize {
-        self.voxels.len() + self.cells.ranges.len()
-    }
-
-    /// How far each cell is from a value in `intervals`: [`Cells::distances`].
-    pub fn distances(&self, device: &mut Device, intervals: &[[f32; 2]], overshoot: f32) -> Result<Distances> {
-        let key = (intervals.iter().map(|ends| ends.map(f32::to_bits)).collect(), overshoot.to_bits());
-        let mut kept = self.distances.borrow_mut();
-        if let Some((_, distances)) = kept.iter().find(|(other, _)| *other == key) {
-            return Ok(distances.clone());
-        }
-        let buffer = self.cells.distances(device, intervals, overshoot)?;
-        let mut bytes = vec![0u8; self.cells.dims().iter().product()];
-        device.read(&buffer, 0, &mut bytes)?;
-        let distances = Distances { buffer: Rc::new(buffer), empty: bytes.iter().filter(|d| **d > 0).count() };
-        if kept.len() == KEPT_DISTANCES {
-            kept.remove(0);
-        }
-        kept.push((key, distances.clone()));
-        Ok(distances)
-    }
-}
-
-/// Distances, and how many cells are empty.
-#[derive(Clone)]
-pub(super) struct Distances {
-    pub buffer: Rc<Buffer>,
-    pub empty: usize,
-}
 
 /// Everything on the device that outlives a job.
 pub(super) struct DeviceContext {
@@ -189,7 +144,7 @@ impl DeviceContext {
         } else {
             voxels
         };
-        let on_device = Rc::new(DeviceVolume { voxels, cells, distances: RefCell::default() });
+        let on_device = Rc::new(DeviceVolume::new(voxels, cells));
         self.volumes.insert(key, (Arc::downgrade(volume), on_device.clone()));
         self.tidy();
         Ok(on_device)

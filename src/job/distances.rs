@@ -2,7 +2,8 @@
 
 use std::rc::Rc;
 
-use super::context::{DeviceContext, DeviceVolume};
+use super::context::DeviceContext;
+use super::device_volume::DeviceVolume;
 use crate::device::Buffer;
 use crate::error::Result;
 use crate::technique::{CellUse, ViewPlan};

@@ -1,6 +1,7 @@
 //! What a view has gathered so far, on the device: sets of samples, and the films that are made of them.
 
 use std::collections::VecDeque;
+use std::rc::Rc;
 use std::time::Duration;
 
 use super::SampleCounts;
@@ -16,7 +17,6 @@ use crate::film::picture::Background;
 use crate::film::{Film, Lowered};
 use crate::scene::Scene;
 use crate::technique::{Random, ViewPlan};
-use crate::volume::Volume;
 
 /// Stride of the control by the picture's shorter side: from 400 on, from 200 on, below. A thousand pixels and more tell the error.
 const CONTROL: [usize; 3] = [8, 4, 2];
@@ -42,15 +42,17 @@ pub(super) struct Gathered {
     developer: Developer,
     /// What was developed last, as long as it is what there is to see.
     developed: Option<Film>,
+    /// What the kernels had counted then.
+    pub counted: SampleCounts,
 }
 
 impl Gathered {
-    /// Room for what `plan` makes of a scene, in the memory of what was gathered `before` where that is as large; `paired` says whether a
+    /// Room for what `plan` makes of a scene, with the tables of twice its step and of its step, in the memory of what was gathered `before` where that is as large; `paired` says whether a
     /// sample of the control differs from the one of its number in the passes proper by its step alone.
     pub fn new(
         context: &mut DeviceContext,
         scene: &Scene,
-        volume: &Volume,
+        [of_control, of_main]: [Rc<Buffer>; 2],
         plan: &ViewPlan,
         paired: bool,
         before: Option<Self>,
@@ -67,10 +69,10 @@ impl Gathered {
         };
         let mut room: VecDeque<Buffer> = room.unwrap_or_default();
         let mut layer =
-            |stride, stream, step| Layer::new(device, scene, volume, stride, stream, step, room.pop_front());
+            |table, stride, stream, step| Layer::new(device, scene, table, stride, stream, step, room.pop_front());
         Ok(Self {
             size,
-            layers: [layer(sparse, 1, 2.0 * plan.step)?, layer(1, 0, plan.step)?],
+            layers: [layer(of_control, sparse, 1, 2.0 * plan.step)?, layer(of_main, 1, 0, plan.step)?],
             moving: None,
             rounds: Rounds::new(scene.is_pilot()),
             counts: device.upload(&[0; 32], 0)?,
@@ -82,6 +84,7 @@ impl Gathered {
             background: scene.background(),
             developer,
             developed: None,
+            counted: SampleCounts::default(),
         })
     }
 
@@ -166,8 +169,8 @@ impl Gathered {
     fn develop_anew(&mut self, context: &DeviceContext) -> Result<Film> {
         let pass = self.shown();
         // Of one sample a pixel has no deviation: it tells only where that sample was not finite.
-        let non_finite = self.counts(context)?.non_finite > 0;
-        let Self { layers, moving, developer, .. } = self;
+        self.counted = self.read_counts(context)?;
+        let Self { layers, moving, developer, counted, .. } = self;
         let shown = layer(layers, moving.as_ref(), pass);
         let main = shown.unread();
         let controlled = pass == Pass::Main && layers[0].samples > 0 && !self.stepless;
@@ -176,7 +179,7 @@ impl Gathered {
             size: self.size,
             background: self.background,
             opacity_threshold: self.opacity_threshold,
-            deviations: main.count > 1 || main.tiles.is_some() || non_finite,
+            deviations: main.count > 1 || main.tiles.is_some() || counted.non_finite > 0,
         };
         let of_control = control.as_ref().map(|samples| Set { buffer: &layers[0].buffer, samples });
         let of_main = Set { buffer: &shown.buffer, samples: &main };
@@ -224,8 +227,7 @@ impl Gathered {
         self.rounds.passed(context, &self.layers[1], device_time)
     }
 
-    /// What the kernels have counted.
-    pub fn counts(&self, context: &DeviceContext) -> Result<SampleCounts> {
+    fn read_counts(&self, context: &DeviceContext) -> Result<SampleCounts> {
         let mut counts = [0u32; 8];
         context.device.read(&self.counts, 0, &mut counts)?;
         let [non_finite, fireflies, clamped, broken, low, high, cut, _] = counts;

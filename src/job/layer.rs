@@ -1,5 +1,7 @@
 //! One set of samples of a view on the device, and which of its pixels a pass samples.
 
+use std::rc::Rc;
+
 use super::context::DeviceContext;
 use super::tiling::{TILE, Tiling};
 use crate::device::develop::PADDING;
@@ -7,7 +9,6 @@ use crate::device::{Buffer, Device};
 use crate::error::Result;
 use crate::film::Samples;
 use crate::scene::Scene;
-use crate::volume::Volume;
 
 /// One set of samples on the device.
 pub(super) struct Layer {
@@ -19,7 +20,7 @@ pub(super) struct Layer {
     pub apart: usize,
     pub samples: u32,
     /// The kernel's table for its step.
-    pub table: Buffer,
+    pub table: Rc<Buffer>,
     /// Its step, world units.
     pub step: f32,
     /// Tells its random numbers from the others'.
@@ -36,7 +37,7 @@ impl Layer {
     pub fn new(
         device: &Device,
         scene: &Scene,
-        volume: &Volume,
+        table: Rc<Buffer>,
         stride: usize,
         stream: u32,
         step: f32,
@@ -51,7 +52,6 @@ impl Layer {
             Ok((tiling, buffer))
         };
         let tiling = scene.view().random().map(tiled).transpose()?;
-        let table = device.upload(bytemuck::cast_slice(&scene.view().table(volume, step)?), 8)?;
         let buffer = device.allocate_in(room, 20 * width * height + PADDING)?;
         Ok(Self { buffer, width, height, stride, apart, samples: 0, table, step, stream, tiling })
     }

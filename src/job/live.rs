@@ -277,7 +277,7 @@ impl Live {
             made: Instant::now(),
             elapsed_ms: self.asked.elapsed().as_secs_f64() * 1e3,
             device_ms: device_time.as_secs_f64() * 1e3,
-            counts: view.gathered.counts(context)?,
+            counts: view.gathered.counted,
             result: self.result.clone(),
             stopped_by,
         };

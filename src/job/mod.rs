@@ -9,6 +9,7 @@ mod compile;
 mod context;
 mod develop;
 mod device_thread;
+mod device_volume;
 mod distances;
 mod engine;
 mod field_run;

@@ -1,11 +1,13 @@
 //! A picture while the camera moves: what is lowered of it, so that frames keep coming.
 
+use std::rc::Rc;
+
 use super::context::DeviceContext;
 use super::layer::Layer;
+use crate::device::Buffer;
 use crate::error::Result;
 use crate::film::{Film, Lowered};
 use crate::scene::Scene;
-use crate::volume::Volume;
 
 /// A frame to the next: as often as most screens show one, where that loses no more than [`MOST_LOSS`], with room for what goes wrong;
 const SMOOTH_MS: f64 = 16.0;
@@ -168,7 +170,7 @@ impl Moving {
     pub fn new(
         context: &DeviceContext,
         scene: &Scene,
-        volume: &Volume,
+        table: Rc<Buffer>,
         step: f32,
         lowered: Lowered,
         step_loss: f64,
@@ -181,7 +183,7 @@ impl Moving {
             }
             _ => {
                 let room = before.map(|b| b.layer.buffer);
-                Layer::new(&context.device, scene, volume, lowered.apart as usize, STREAM, lowered.step * step, room)?
+                Layer::new(&context.device, scene, table, lowered.apart as usize, STREAM, lowered.step * step, room)?
             }
         };
         Ok(Self { layer, lowered, step_loss })

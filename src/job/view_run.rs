@@ -8,7 +8,8 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::context::{DeviceContext, DeviceVolume};
+use super::context::DeviceContext;
+use super::device_volume::DeviceVolume;
 use super::distances::distances;
 use super::gathered::Gathered;
 use super::motion::{Motion, Moving};
@@ -75,7 +76,9 @@ impl ViewRun {
         let on_device = context.volume(volume)?;
         let distances = distances(context, &on_device, volume, &mut plan)?;
         let view = Self::view(scene, volume);
-        let gathered = Gathered::new(context, scene, volume, &plan, is_paired(&view), before)?;
+        let table = |step| on_device.table(&context.device, scene, volume, step);
+        let tables = [table(2.0 * plan.step)?, table(plan.step)?];
+        let gathered = Gathered::new(context, scene, tables, &plan, is_paired(&view), before)?;
         let device = &context.device;
         let parameters = device.upload(&scene.view().parameters(volume, scene.camera())?, 0)?;
         let view_buffer = device.allocate(size_of::<DeviceView>())?;
@@ -156,8 +159,7 @@ impl ViewRun {
         self.pace = Pace::new(context.device.info(), self.longest / f64::from(self.plan.step), None);
         for (layer, step) in self.gathered.layers.iter_mut().zip([2.0 * self.plan.step, self.plan.step]) {
             (layer.samples, layer.step) = (0, step);
-            let table = scene.view().table(volume, step)?;
-            context.device.write(&mut layer.table, 0, bytemuck::cast_slice(&table))?;
+            layer.table = self.volume.table(&context.device, scene, volume, step)?;
         }
         (self.pass, self.cursor) = (None, 0);
         self.gathered.rounds.forget();
@@ -184,7 +186,8 @@ impl ViewRun {
         self.gathered.will_change();
         let before = self.gathered.moving.take();
         if !lowered.is_none() {
-            self.gathered.moving = Some(Moving::new(context, scene, volume, step, lowered, step_loss, before)?);
+            let table = self.volume.table(&context.device, scene, volume, lowered.step * step)?;
+            self.gathered.moving = Some(Moving::new(context, scene, table, step, lowered, step_loss, before)?);
         }
         Ok(())
     }

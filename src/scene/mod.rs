@@ -53,6 +53,7 @@ pub struct Budget {
 pub struct Scene {
     technique: &'static Technique,
     view: Arc<dyn View>,
+    own: Arc<str>,
     subject: Subject,
     framing: Framing,
     camera: Camera,
@@ -138,8 +139,9 @@ impl Scene {
                 "a view; put the field under volume",
             ));
         };
-        let view = parse(&own_parameters(technique, &request)?, &format!("/{}", technique.name))
-            .map_err(|e| where_it_was_given(e, technique, &request))?;
+        let own = own_parameters(technique, &request)?;
+        let view =
+            parse(&own, &format!("/{}", technique.name)).map_err(|e| where_it_was_given(e, technique, &request))?;
         let (subject, framing) = subject::of_request(request.volume.as_ref(), store, limits)?;
         if view.shows_labels() && request.volume.as_ref().is_some_and(|v| v.level.is_some_and(|l| l > 0)) {
             return Err(Error::invalid("/volume/level", "there is no mean of labels", "0, or leave it out"));
@@ -157,6 +159,7 @@ impl Scene {
         let scene = Self {
             technique,
             view,
+            own: format!("{} {own}", technique.name).into(),
             subject,
             framing,
             camera,
@@ -214,6 +217,10 @@ impl Scene {
     /// The view with its parameters.
     pub fn view(&self) -> &Arc<dyn View> {
         &self.view
+    }
+    /// The technique and its own parameters as the request has them: what belongs to those alone can be kept by it.
+    pub(crate) fn own(&self) -> &Arc<str> {
+        &self.own
     }
     /// What is looked at.
     pub fn subject(&self) -> &Subject {
