@@ -68,12 +68,15 @@ static inline Flight no_flight(uint sample) {
     return f;
 }
 
+// A direction of the world in index units per world unit.
+static inline Real3 way_of(constant const View *view, Real3 d) {
+    constant const float *w = view->world_gradient_from_index;
+    return real3(mad(w[0], d.x, mad(w[3], d.y, w[6] * d.z)), mad(w[1], d.x, mad(w[4], d.y, w[7] * d.z)), mad(w[2], d.x, mad(w[5], d.y, w[8] * d.z)));
+}
+
 // Points the lanes of `turned` along their d, from their p.
 static inline void aim(constant const View *view, constant const Scattering *params, Mask turned, Flight *f) {
-    constant const float *w = view->world_gradient_from_index;
-    Real3 d = f->d;
-    Real3 way = real3(mad(w[0], d.x, mad(w[3], d.y, w[6] * d.z)), mad(w[1], d.x, mad(w[4], d.y, w[7] * d.z)),
-                      mad(w[2], d.x, mad(w[5], d.y, w[8] * d.z)));
+    Real3 way = way_of(view, f->d);
     f->way = select3(f->way, way, turned);
     f->inverse = select3(f->inverse, real3(1.0f / way.x, 1.0f / way.y, 1.0f / way.z), turned);
     f->cell.x = select(f->cell.x, cell_on_axis(f->p.x, 0.0f, params->walls_per_voxel[0], params->walls[0]), turned);
@@ -120,6 +123,22 @@ static inline Sight look(constant const View *view, constant const Scattering *p
     f->left = select(f->left, (Real)(0.0f), fresh & ~s.meets);
     return s;
 }
+
+#if GEOMETRY == BOX
+// What of each colour gets from p in the box along d, as far as `length` or the box's faces.
+static inline Real3 box_transmittance(constant const View *view, constant const Scattering *params, Real3 p, Real3 d, Real length) {
+    Real3 way = way_of(view, d);
+    #define REACH(i, c) select((select((Real)(0.0f), (Real)((float)view->dims[i]), MASK(way.c > 0.0f)) - p.c) / way.c, (Real)(1e30f), MASK(fabs(way.c) < 1e-12f))
+    Real x = REACH(0, x), y = REACH(1, y), z = REACH(2, z), t = LESSER(LESSER(x, y), LESSER(z, length));
+    #undef REACH
+    Real tau = GREATER(t, (Real)(0.0f)) * params->majorant;
+    if (!params->chromatic) {
+        Real through = exp(-tau);
+        return real3(through, through, through);
+    }
+    return real3(exp(-tau * params->colour[0]), exp(-tau * params->colour[1]), exp(-tau * params->colour[2]));
+}
+#endif
 
 // The density of a raw value; what is not a number is empty.
 static inline Real density_of(constant const Scattering *params, Real raw) {
@@ -197,12 +216,12 @@ static inline Mask fly(constant const View *view, constant const Scattering *par
                        global uint *counts, Mask alive, Flight *f, UInt4Lanes *r, Mask *over, Int *face) {
     Real rate = rate_at(view, params, voxels, ranges, f);
     #define WALL(i, c) wall_on_axis(f->cell.c, MASK(f->way.c > 0.0f), 0.0f, params->wall_voxels[i], (float)view->dims[i], params->walls[i])
-    #define REACH(c) select(fmax((w##c - f->p.c) * f->inverse.c, (Real)(0.0f)), (Real)(1e30f), MASK(fabs(f->way.c) < 1e-12f))
+    #define REACH(c) select(GREATER((w##c - f->p.c) * f->inverse.c, (Real)(0.0f)), (Real)(1e30f), MASK(fabs(f->way.c) < 1e-12f))
     Real wx = WALL(0, x), wy = WALL(1, y), wz = WALL(2, z);
     Real tx = REACH(x), ty = REACH(y), tz = REACH(z);
     #undef WALL
     #undef REACH
-    Real t_wall = fmin(tx, fmin(ty, tz)), room = fmin(t_wall, f->left);
+    Real t_yz = LESSER(ty, tz), t_wall = LESSER(tx, t_yz), room = LESSER(t_wall, f->left);
     Mask ends = alive & MASK(f->left <= t_wall);
 #if TRACKING == MARCH
     Real t = fmin(room, (Real)(params->march_step));

@@ -118,7 +118,8 @@ static inline Real one_minus_cosine(Real3 a, Real3 b) {
 // The density per steradian of a turn of which 1 - the cosine is that.
 static inline Real phase_density(global const float *table, const Medium *m, Real one_minus) {
     Real mu = 1.0f - one_minus;
-    Real density = mad(m->c, lobe_density(m->a, one_minus), (1.0f - m->c) * lobe_density(m->b, one_minus));
+    Real density = m->c * lobe_density(m->a, one_minus);
+    if (any_lane(MASK(m->c < 1.0f))) density = mad(1.0f - m->c, lobe_density(m->b, one_minus), density);
     Mask rayleigh = MASK(m->kind == PHASE_RAYLEIGH), tabulated = MASK(m->kind == PHASE_TABLE);
     density = select(density, 0.0596831037f * mad(mu, mu, (Real)(1.0f)), rayleigh);
     if (any_lane(tabulated)) {
