@@ -9,14 +9,6 @@
 #endif
 
 #ifdef NARROW
-// One load wherever it lies; of vload4's four bytes the compiler makes several.
-typedef struct __attribute__((packed)) { int word; } UnalignedInt;
-typedef struct __attribute__((packed)) { long word; } UnalignedLong;
-typedef struct __attribute__((packed)) { float4 four; } UnalignedFloat4;
-#define INT_AT(from) ((global const UnalignedInt *)(from))->word
-#define LONG_AT(from) ((global const UnalignedLong *)(from))->word
-#define FOUR_AT(from) ((global const UnalignedFloat4 *)(from))->four
-
 static inline int4 load_rows(global const uchar *from, int row) {
     return (int4)(INT_AT(from), INT_AT(from + row), INT_AT(from + 2 * row), INT_AT(from + 3 * row));
 }

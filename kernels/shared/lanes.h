@@ -150,6 +150,16 @@ static inline float least_lane(Real v) {
 
 static inline float greatest_lane(Real v) { return -least_lane(-v); }
 
+// One load wherever it lies, of any alignment: of vload4 and the like PoCL makes several.
+typedef struct __attribute__((packed)) { int word; } UnalignedInt;
+typedef struct __attribute__((packed)) { long word; } UnalignedLong;
+typedef struct __attribute__((packed)) { float4 four; } UnalignedFloat4;
+typedef struct __attribute__((packed)) { Real lanes; } UnalignedReal;
+#define INT_AT(from) ((global const UnalignedInt *)(from))->word
+#define LONG_AT(from) ((global const UnalignedLong *)(from))->word
+#define FOUR_AT(from) ((global const UnalignedFloat4 *)(from))->four
+#define REALS_AT(from) ((global const UnalignedReal *)(from))->lanes
+
 // gather_words(base, byte_offset): 32 bits from base + byte_offset, unaligned, a lane.
 // One AVX-512 or AVX2 instruction where clang has it; plain loads elsewhere. The buffer is padded by 8 bytes.
 #if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_gathersiv16si)
@@ -161,17 +171,16 @@ static inline Int gather_words(global const uchar *base, Int byte_offset) {
     return __builtin_ia32_gatherd_d256((Int)(0), (const int *)(size_t)base, byte_offset, (Int)(-1), 1);
 }
 #else
-static inline int load_word(global const uchar *address) {
-    uchar4 bytes = vload4(0, address);
+#if LANES == 1
+static inline Int gather_words(global const uchar *base, Int byte_offset) {
+    uchar4 bytes = vload4(0, base + byte_offset);
     return as_int(bytes);
 }
-#if LANES == 1
-static inline Int gather_words(global const uchar *base, Int byte_offset) { return load_word(base + byte_offset); }
 #else
 static inline Int gather_words(global const uchar *base, Int byte_offset) {
     IntLanes offset, word;
     offset.v = byte_offset;
-    for (int i = 0; i < LANES; i++) word.lane[i] = load_word(base + offset.lane[i]);
+    for (int i = 0; i < LANES; i++) word.lane[i] = INT_AT(base + offset.lane[i]);
     return word.v;
 }
 #endif

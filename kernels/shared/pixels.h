@@ -18,8 +18,7 @@ static inline Real3 load_pixels(global const float *film, int pixel, Real *alpha
 #define EACH(a, b, c, d) ((Real)(PART(v0, a, b, c, d), PART(v1, a, b, c, d), PART(v2, a, b, c, d), PART(v3, a, b, c, d)))
 static inline Real3 load_pixels(global const float *film, int pixel, Real *alpha) {
     global const float *from = film + 4 * pixel;
-    Real v0 = JOIN(vload, LANES)(0, from), v1 = JOIN(vload, LANES)(1, from);
-    Real v2 = JOIN(vload, LANES)(2, from), v3 = JOIN(vload, LANES)(3, from);
+    Real v0 = REALS_AT(from), v1 = REALS_AT(from + LANES), v2 = REALS_AT(from + 2 * LANES), v3 = REALS_AT(from + 3 * LANES);
     *alpha = EACH(3, 7, b, f);
     return real3(EACH(0, 4, 8, c), EACH(1, 5, 9, d), EACH(2, 6, a, e));
 }
@@ -32,7 +31,7 @@ static inline Real load_reals(global const float *from, int pixel) {
 #if LANES == 1
     return from[pixel];
 #else
-    return JOIN(vload, LANES)(0, from + pixel);
+    return REALS_AT(from + pixel);
 #endif
 }
 
@@ -53,12 +52,32 @@ static inline int count_clipped(Real3 c, Mask lanes) {
     return count_lanes(MASK(c.x > 1.0f) & lanes) + count_lanes(MASK(c.y > 1.0f) & lanes) + count_lanes(MASK(c.z > 1.0f) & lanes);
 }
 
-typedef union { Int v; uchar4 lane[LANES]; } ByteLanes;
+typedef union { Int v; uchar4 lane[LANES]; uchar16 four[LANES < 4 ? 1 : LANES / 4]; } ByteLanes;
+typedef struct __attribute__((packed)) { uchar16 bytes; } Unaligned16;
+typedef struct __attribute__((packed)) { uint2 words; } Unaligned8;
+typedef struct __attribute__((packed)) { uint word; } Unaligned4;
 
 // Writes the bytes of pixels of a row, of which `inside` are the picture's.
 static inline void store_bytes(constant Develop *d, global uchar *picture, int at, int inside, Int bytes) {
     ByteLanes lanes;
     lanes.v = bytes;
+#if LANES > 1
+    if (!d->transparent && inside >= LANES) {
+        // Of four pixels three words: a store of four, whose last the next four's takes over.
+        global uchar *to = picture + 3 * at;
+        for (int i = 0; i < LANES / 4; i++, to += 12) {
+            uchar16 v = lanes.four[i], three = __builtin_shufflevector(v, v, 0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13, 14, -1, -1, -1, -1);
+            if (i + 1 < LANES / 4) {
+                ((global Unaligned16 *)to)->bytes = three;
+            } else {
+                uint4 words = as_uint4(three);
+                ((global Unaligned8 *)to)->words = words.lo;
+                ((global Unaligned4 *)(to + 8))->word = words.z;
+            }
+        }
+        return;
+    }
+#endif
     for (int i = 0; i < LANES; i++) {
         if (i >= inside) break;
         if (d->transparent)
