@@ -75,7 +75,8 @@ fn a_kernel_that_does_not_build_takes_only_itself_out() {
     let (status, problem) = render(&server, &picture(true));
     assert_eq!(status, 501, "{problem}");
     let words = problem["detail"].as_str().unwrap();
-    assert!(words.contains("emission_absorption f32") && words.contains("SHADED=1"), "{words}");
+    // Its floats are taken as words.
+    assert!(words.contains("emission_absorption u16") && words.contains("SHADED=1"), "{words}");
     assert_eq!(problem["type"], "/problems/kernel-not-available");
     assert_eq!(render(&server, &picture(false)).0, 200);
     // As a resource it says the same.

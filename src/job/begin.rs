@@ -64,19 +64,19 @@ impl Live {
         }
     }
 
-    /// Whether kernels are ready; one that is not is waited for.
+    /// Whether kernels are ready. Those that are not are asked for, and the job says that it waits for the first of them.
     fn is_ready(&self, context: &mut DeviceContext, variants: &[Variant]) -> Result<bool> {
-        let mut all = true;
+        let mut missing = None;
         for variant in variants {
             if !context.is_ready(variant)? {
-                self.job.waits_for(variant);
-                all = false;
+                missing.get_or_insert(variant);
             }
         }
-        if all {
-            self.job.started();
+        match missing {
+            Some(variant) => self.job.waits_for(variant),
+            None => self.job.started(),
         }
-        Ok(all)
+        Ok(missing.is_none())
     }
 
     fn begin_field(&mut self, context: &mut DeviceContext) -> Result<()> {
@@ -104,7 +104,9 @@ impl Live {
         if let Some(field) = &self.field {
             let mut progress = self.job.lock();
             progress.field = Some(volume.clone());
-            progress.complete_field = field.is_done().then(|| volume.clone()).or(progress.complete_field.take());
+            if field.is_done() {
+                progress.complete_field = Some(volume.clone());
+            }
         }
         let words = scene.view().resolution(&volume)?.and_then(|resolution| volume.words(resolution));
         let mut plan = scene.view().plan(words.as_ref().unwrap_or(&volume))?;

@@ -47,8 +47,9 @@ pub(super) struct Gathered {
 }
 
 impl Gathered {
-    /// Room for what `plan` makes of a scene, with the tables of twice its step and of its step, in the memory of what was gathered `before` where that is as large; `paired` says whether a
-    /// sample of the control differs from the one of its number in the passes proper by its step alone.
+    /// Room for what `plan` makes of a scene, with the tables of twice its step and of its step, in the memory of what was gathered `before`
+    /// where that is as large; `paired` says whether a sample of the control differs from the one of its number in the passes proper by
+    /// its step alone.
     pub fn new(
         context: &mut DeviceContext,
         scene: &Scene,

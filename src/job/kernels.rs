@@ -75,8 +75,8 @@ pub(super) fn source_of(variant: &Variant) -> Result<Source> {
     sources().find(|s| s.kernel == variant.kernel).ok_or_else(missing)
 }
 
-/// What the first picture needs, most likely: the first technique on words, as it takes the floats of built-in volumes, and on bytes, and
-/// what films are developed by.
+/// What the first picture needs, most likely: the first technique on words, which the floats of built-in volumes are taken as, and on
+/// bytes, and what films are developed by.
 pub(super) fn first() -> Vec<Variant> {
     let views = technique::ALL.first().map_or(Vec::new(), |t| ((t.source)().variants)());
     let of =

@@ -21,6 +21,10 @@ use crate::volume::Volume;
 
 /// A turn on the device: long enough to be worth a launch, short enough that nobody waits and a cancel is felt at once.
 const SLICE: Duration = Duration::from_millis(20);
+/// A turn while the camera moves and its picture is there: the next camera does not wait for the rest of it,
+const MOVING_SLICE: Duration = Duration::from_millis(2);
+/// until none has come for so long.
+const AT_REST: Duration = Duration::from_millis(100);
 /// A turn of a field: its packets end at very different times, and a longer slice wastes fewer lanes on the last of them.
 const FIELD_SLICE: Duration = Duration::from_millis(40);
 /// Frames are not made faster than the eye sees: encoding takes cores that the device wants.
@@ -174,9 +178,13 @@ impl Live {
     fn view_turn(&mut self, context: &mut DeviceContext) -> Result<Turn> {
         if self.unseen && !self.job.developing.swap(true, Ordering::AcqRel) {
             self.snapshot(context, None)?;
+            // The next camera may have come.
+            return Ok(Turn::Again);
         }
+        let moves = self.generation > 0 && self.asked.elapsed() < AT_REST && (self.unseen || self.last_frame.is_some());
         let Some(view) = &mut self.view else { return Ok(Turn::Over) };
-        let Some(pass) = view.slice(context, SLICE)? else { return Ok(Turn::Again) };
+        let slice = if moves { MOVING_SLICE } else { SLICE };
+        let Some(pass) = view.slice(context, slice)? else { return Ok(Turn::Again) };
         if pass == Pass::Moving {
             // Not left out because the frame before is still being encoded: the next camera is not followed before this is seen.
             self.unseen = true;
