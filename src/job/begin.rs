@@ -108,7 +108,7 @@ impl Live {
                 progress.complete_field = Some(volume.clone());
             }
         }
-        let words = scene.view().resolution(&volume)?.and_then(|resolution| volume.words(resolution));
+        let words = scene.words_of(&volume)?;
         let mut plan = scene.view().plan(words.as_ref().unwrap_or(&volume))?;
         if words.is_some() {
             let half = 0.5 * volume.word_step();

@@ -172,6 +172,8 @@ impl Scene {
         };
         if let Subject::Volume(volume) = &scene.subject {
             scene.view.plan(volume)?;
+            // Made here, so that the device thread finds them there.
+            scene.words_of(volume)?;
         }
         Ok(scene)
     }
@@ -221,6 +223,13 @@ impl Scene {
     /// The technique and its own parameters as the request has them: what belongs to those alone can be kept by it.
     pub(crate) fn own(&self) -> &Arc<str> {
         &self.own
+    }
+    /// The words that the view takes a volume's floats as, where it does.
+    ///
+    /// # Errors
+    /// As [`View::plan`].
+    pub(crate) fn words_of(&self, volume: &Volume) -> Result<Option<Arc<Volume>>> {
+        Ok(self.view.resolution(volume)?.and_then(|resolution| volume.words(resolution)))
     }
     /// What is looked at.
     pub fn subject(&self) -> &Subject {

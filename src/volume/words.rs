@@ -46,6 +46,7 @@ impl Volume {
         });
         let inter = self.inter() + self.slope() * low;
         let parts = NewVolume { slope, inter, notes: self.notes().to_vec(), ..self.parts_with(Voxels::U16(words)) };
-        Some(Arc::new(self.derived(parts, self.world_from_index)))
+        let words = self.derived(parts, self.world_from_index);
+        Some(Arc::new(Self { bright_mean: self.bright_mean.clone(), ..words }))
     }
 }
