@@ -24,6 +24,8 @@ use crate::volume::Volume;
 
 /// The shortest step that `max_error` leads to, in voxels: the shortest that a request may ask for.
 const LEAST_STEP_VOXELS: f64 = 0.05;
+/// A pass in shorter slices does not tell how fast its kernel is: each waits for its longest rays.
+const TELLING_SLICE: Duration = Duration::from_millis(10);
 /// A picture is not shown before its first pass where that is likely to take less than this.
 const QUICK_MS: f64 = 50.0;
 
@@ -56,6 +58,8 @@ pub(super) struct ViewRun {
     /// Whether the first pass is likely to be over before a picture of the control could be seen.
     quick: bool,
     pass_time: Duration,
+    /// The shortest slice of the pass under way.
+    shortest_slice: Duration,
     /// The longest way through the volume, world units.
     longest: f64,
     least_step: f32,
@@ -90,6 +94,7 @@ impl ViewRun {
             pace: Pace::new(context.device.info(), longest / f64::from(plan.step), speed),
             quick: quick(speed, gathered.size),
             pass_time: Duration::ZERO,
+            shortest_slice: Duration::MAX,
             longest,
             least_step: (LEAST_STEP_VOXELS * smallest) as f32,
             random: scene.view().random(),
@@ -223,6 +228,7 @@ impl ViewRun {
         self.pace.learn(items, rays, took);
         self.device_time += took;
         self.pass_time += took;
+        self.shortest_slice = self.shortest_slice.min(slice);
         self.cursor += items;
         if self.cursor < beams {
             return Ok(None);
@@ -234,7 +240,9 @@ impl ViewRun {
         if pass == Pass::Main {
             self.ray_ms = None;
             let [width, height] = self.gathered.size;
-            context.measured(&self.plan.variant, width * height, self.pass_time);
+            if self.shortest_slice >= TELLING_SLICE {
+                context.measured(&self.plan.variant, width * height, self.pass_time);
+            }
         }
         self.gathered.layer_mut(pass).passed();
         (self.pass, self.cursor) = (None, 0);
@@ -268,7 +276,7 @@ impl ViewRun {
         };
         self.pass_view = view;
         self.pass = Some(pass);
-        self.pass_time = Duration::ZERO;
+        (self.pass_time, self.shortest_slice) = (Duration::ZERO, Duration::MAX);
         Ok(pass)
     }
 }
