@@ -9,7 +9,7 @@ pub mod pictures;
 pub mod processes;
 
 use std::io::{BufRead, BufReader};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -92,9 +92,18 @@ impl Server {
     }
 
     fn spawn_env(flags: &[&str], environment: &[(&str, &str)]) -> Self {
+        Self::spawn_program(Path::new(env!("CARGO_BIN_EXE_cloudchamber")), flags, environment)
+    }
+
+    /// A server of another build, once it is ready.
+    pub fn start_program(program: &Path, environment: &[(&str, &str)]) -> Self {
+        Self::spawn_program(program, &[], environment).once_ready()
+    }
+
+    fn spawn_program(program: &Path, flags: &[&str], environment: &[(&str, &str)]) -> Self {
         let data = tempfile::tempdir().unwrap();
         std::fs::create_dir_all(kernel_cache()).unwrap();
-        let mut child = Command::new(env!("CARGO_BIN_EXE_cloudchamber"))
+        let mut child = Command::new(program)
             .args(["serve", "--listen", "127.0.0.1:0", "--data-dir"])
             .arg(data.path())
             .args(flags)
