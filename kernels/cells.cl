@@ -2,6 +2,8 @@
 // the samples [CELL c, CELL c + CELL) reads the voxels CELL c - 1 .. CELL c + CELL. One work-item is one row of cells in x.
 // A cell of NaN only has its least above its greatest.
 
+#include "shared/voxel.h"
+
 kernel void cells(constant CellsPass *pass, global const Voxel *voxels, global Voxel *ranges) {
     int nx = pass->dims[0], ny = pass->dims[1], nz = pass->dims[2];
     int wide = (nx + CELL - 1) / CELL, high = (ny + CELL - 1) / CELL, deep = (nz + CELL - 1) / CELL;

@@ -4,6 +4,9 @@
 // of the picture, which is interpolated. Each of the first two leaves SUMS numbers of its own, which the host adds up in double precision.
 // Squares are added up as parts of the greatest square so far, so that none is lost below the least float.
 
+#include "shared/lanes.h"
+#include "shared/pixels.h"
+
 // Pixels of a row that a work-item takes; a whole number of packets and of tiles.
 #define ACROSS (LANES == 1 ? 32 : 8 * LANES)
 #define SUMS 12

@@ -2,6 +2,8 @@
 // axis a pass (x, y, z), since the greatest of three differences can be taken one after the other. A cell is occupied where
 // its range meets one of the intervals. One work-item is one line of cells along the pass's axis.
 
+#include "shared/voxel.h"
+
 static inline bool occupied(constant CellsPass *pass, global const float *intervals, global const Voxel *ranges, int cell) {
     float low = (float)ranges[2 * cell], high = (float)ranges[2 * cell + 1];
     if (!(low <= high)) return false;

@@ -1,6 +1,17 @@
 // Emission and absorption along a ray: I = sum_k c_k a_k prod_{j<k} (1 - a_j), a = 1 - exp(-sigma ds)
 // (Max, "Optical Models for Direct Volume Rendering", IEEE TVCG 1(2), 1995). One work-item is one beam of pixels.
 
+#include "shared/block.h"
+#include "shared/camera.h"
+#include "shared/film.h"
+#include "shared/inner.h"
+#include "shared/lanes.h"
+#include "shared/optical.h"
+#include "shared/packet.h"
+#include "shared/shade.h"
+#include "shared/style.h"
+#include "shared/volume.h"
+
 typedef struct { Real3 colour; Real transmittance; } Radiance;
 
 // The weight of what is behind all there is, in the lanes whose ray has not ended; what is behind that gets so much less.

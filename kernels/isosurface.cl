@@ -3,6 +3,15 @@
 // LAYERED: several surfaces, or some that are not opaque, are composited front to back. Otherwise a packet's rays go to their
 // first crossing, and all of them are refined and lit at once.
 
+#include "shared/camera.h"
+#include "shared/crossing.h"
+#include "shared/film.h"
+#include "shared/inner.h"
+#include "shared/lanes.h"
+#include "shared/packet.h"
+#include "shared/shade.h"
+#include "shared/volume.h"
+
 typedef struct {
     Real ahead;          // the value at the end of the last step
     int fresh;           // whether that is not known, since a leap came after it

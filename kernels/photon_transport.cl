@@ -4,6 +4,17 @@
 // One work-item carries a packet of photons; a lane whose photon has ended takes the next of the item's. On a CPU one item of each
 // work-group works and has a grid of its own, for atomics take a third of the time.
 
+#include "shared/compton.h"
+#include "shared/deposit.h"
+#include "shared/lanes.h"
+#include "shared/medium.h"
+#include "shared/passage.h"
+#include "shared/phase.h"
+#include "shared/photon.h"
+#include "shared/rng.h"
+#include "shared/tally.h"
+#include "shared/walls.h"
+
 // Whether photons are launched into so many free lanes. A launch costs about a step of all lanes: if each fills f of them, and photons
 // live n steps, then LANES / (n f) of the time goes into launches and (f - 1) / (2 LANES) is lost to free lanes, the least together
 // where f^2 is 2 LANES^2 / n. So far n is LANES times the steps that have passed over the photons taken.

@@ -2,6 +2,14 @@
 // WALKED is the exact walk of shared/walk.h; without it greatest and least are taken on the steps of shared/packet.h, the
 // part of a beam with the greatest bound first, until no part is left that could show more. One work-item is one beam.
 
+#include "shared/film.h"
+#include "shared/inner.h"
+#include "shared/lanes.h"
+#include "shared/packet.h"
+#include "shared/volume.h"
+#include "shared/walk.h"
+#include "shared/window.h"
+
 #define MODE_PEAK 0
 #define MODE_MEAN 1
 #define MODE_SUM 2

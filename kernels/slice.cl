@@ -1,6 +1,14 @@
 // A plane through the volume, or the greatest, least or mean value of a slab around it along its normal, by the exact walk of
 // shared/walk.h. One work-item is one beam.
 
+#include "shared/camera.h"
+#include "shared/inner.h"
+#include "shared/lanes.h"
+#include "shared/packet.h"
+#include "shared/volume.h"
+#include "shared/walk.h"
+#include "shared/window.h"
+
 static inline void cut(constant const View *view, constant const Slice *params, VOLUME voxels, global const uchar *table,
                        global float *film, global uint *counts, const Packet *p) {
     constant const float *a = params->plane_index, *n = params->normal_index;

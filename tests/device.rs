@@ -47,7 +47,6 @@ fn offsets_on_the_device<T: DeviceStruct>() -> Vec<usize> {
     let mut device = open(None, Some(folder.path()));
     let source = Source {
         kernel: "offsets",
-        headers: &[],
         structs: T::opencl_text,
         arguments: 1,
         volume: None,
@@ -150,15 +149,8 @@ fn a_warning_fails_the_build() {
     )
     .unwrap();
     let mut device = open(None, Some(folder.path()));
-    let source = Source {
-        kernel: "sloppy",
-        headers: &[],
-        structs: String::new,
-        arguments: 1,
-        volume: None,
-        variants: Vec::new,
-        common: 0,
-    };
+    let source =
+        Source { kernel: "sloppy", structs: String::new, arguments: 1, volume: None, variants: Vec::new, common: 0 };
     let variant = Variant { kernel: "sloppy", voxel: None, features: &[] };
     assert!(device.build(&source, &variant).is_err());
 }

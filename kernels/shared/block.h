@@ -1,5 +1,12 @@
 // Samples of 16 or 8 lanes that are within NARROW voxels of each other: the 4 x 4 x 4 voxels that they read come by a load a row, all
 // lanes together, and are read by permutations. What a lane would gather for itself costs two to four times as much.
+#ifndef SHARED_BLOCK_H
+#define SHARED_BLOCK_H
+
+#include "shared/inner.h"
+#include "shared/lanes.h"
+#include "shared/volume.h"
+
 #if INTERPOLATION == TRILINEAR && !VOLUMES_ARE_IMAGES
 #if WEIGHTS_ARE_WORDS && (VOXEL == VOXEL_U8 || LANES == 16)
 #define NARROW 1.98f
@@ -224,4 +231,6 @@ static inline Real3 narrow_gradient(constant const View *view, VOLUME voxels, co
     #undef AT
 }
 #endif
+#endif
+
 #endif

@@ -3,6 +3,10 @@
 //   point(i, j)  = view->plane + i view->right + j view->down             in index units
 //   towards      = the same less the eye (perspective) or constant (orthographic), in index units and in world units
 // The parameter t is in world units, 0 on the plane; the eye is at t = -t_eye.
+#ifndef SHARED_CAMERA_H
+#define SHARED_CAMERA_H
+
+#include "shared/lanes.h"
 
 typedef struct {
     Real3 origin;     // index units
@@ -77,3 +81,5 @@ static inline Real3 ray_world(constant const View *view, Real x, Real y) {
     Real3 w = affine3(view->towards_world, view->right_world, view->down_world, px, py);
     return scale3(w, rsqrt(dot3(w, w)));
 }
+
+#endif

@@ -1,4 +1,11 @@
 // Gamma photons: attenuation by energy, and Compton scattering off free electrons at rest (Klein & Nishina, Z. Phys. 52, 1929).
+#ifndef SHARED_COMPTON_H
+#define SHARED_COMPTON_H
+
+#include "shared/lanes.h"
+#include "shared/photon.h"
+#include "shared/rng.h"
+
 #if GAMMA
 #define ELECTRON_KEV 510.99895f
 #define GAMMA_ROWS 512
@@ -34,4 +41,6 @@ static inline Real compton(constant const FieldPass *pass, const Photon *photon,
     *one_minus = minus;
     return kept;
 }
+#endif
+
 #endif

@@ -1,4 +1,13 @@
 // Where a ray crosses an isosurface, to a ten-thousandth of a voxel, and what the surface is there.
+#ifndef SHARED_CROSSING_H
+#define SHARED_CROSSING_H
+
+#include "shared/camera.h"
+#include "shared/inner.h"
+#include "shared/lanes.h"
+#include "shared/packet.h"
+#include "shared/rng.h"
+#include "shared/volume.h"
 
 // Two places along a ray between which the value passes the isovalue: f is the value less the isovalue.
 typedef struct { Real t0, t1, f0, f1, isovalue; } Bracket;
@@ -113,3 +122,5 @@ static inline Real occlusion(constant const View *view, constant const Isosurfac
     #undef INDEX
     return hidden / (float)params->occlusion_rays;
 }
+
+#endif

@@ -2,6 +2,11 @@
 // Functions for Direct Volume Rendering", IEEE Visualization 2003): from gradient g and Hessian H of the cubic B-spline
 // through the voxels, with n = -g / |g|, P = 1 - n n^T, G = -P H P / |g|, T = trace G, F = |G|_F:
 // kappa_1,2 = (T ± sqrt(2 F² - T²)) / 2. Positive where the surface of something bright is convex.
+#ifndef SHARED_CURVATURE_H
+#define SHARED_CURVATURE_H
+
+#include "shared/lanes.h"
+#include "shared/volume.h"
 
 typedef struct { Real xx, yy, zz, xy, xz, yz; } Symmetric;
 
@@ -88,3 +93,5 @@ static inline Curvature curvature(constant const View *view, Real3 g, Symmetric 
     c.second = 0.5f * (trace - apart);
     return c;
 }
+
+#endif

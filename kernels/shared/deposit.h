@@ -1,4 +1,11 @@
 // Adds what photons leave to the grid: at collisions, or along the way.
+#ifndef SHARED_DEPOSIT_H
+#define SHARED_DEPOSIT_H
+
+#include "shared/lanes.h"
+#include "shared/medium.h"
+#include "shared/tally.h"
+#include "shared/walls.h"
 
 // The grid's sums, and whether nobody else adds to them. Then it takes neither atomics nor branches, and what is added waits until the
 // next is: meanwhile its places come from memory. They are all over the grid, and waiting for them took a third of the time.
@@ -77,4 +84,6 @@ static inline void deposit_track(constant const PhotonTransport *params, global 
         on &= MASK(to < length);
     }
 }
+#endif
+
 #endif

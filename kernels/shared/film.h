@@ -2,6 +2,10 @@
 // the luminance (Welford, "Note on a method for calculating corrected sums of squares and products", Technometrics 4,
 // 1962: sums and sums of squares that do not cancel). Layout: 4 floats a pixel, then one M2 a pixel. A sample that is not finite is
 // taken as black and counted, and its pixel's M2 is no number from then on: its error is not known.
+#ifndef SHARED_FILM_H
+#define SHARED_FILM_H
+
+#include "shared/lanes.h"
 
 #define COUNT_NON_FINITE 0
 
@@ -34,3 +38,5 @@ static inline void film_packet(constant const View *view, global float *film, gl
             film_add(film, counts, y.lane[i] * view->width + x.lane[i], view->width * view->height, view->sample,
                      (float4)(red.lane[i], green.lane[i], blue.lane[i], opacity.lane[i]));
 }
+
+#endif

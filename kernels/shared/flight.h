@@ -5,6 +5,17 @@
 // Extinctions of three colours are tracked together by that of the greatest: a collision is real with the probability
 // P = sum(w sigma) / (m sum(w)) of the light w that is left, and the colours are weighed by sigma / (m P) or (m - sigma) / (m (1 - P))
 // (Kutz, Habel, Li, Novak, "Spectral and Decomposition Tracking", SIGGRAPH 2017).
+#ifndef SHARED_FLIGHT_H
+#define SHARED_FLIGHT_H
+
+#include "shared/camera.h"
+#include "shared/film.h"
+#include "shared/lanes.h"
+#include "shared/phase.h"
+#include "shared/rng.h"
+#include "shared/volume.h"
+#include "shared/walls.h"
+
 #define BOX 0
 #define GRID 1
 
@@ -330,3 +341,5 @@ static inline void finish(constant const View *view, constant const Scattering *
         film_add(film, counts, pixel.lane[i], pixels, (int)sample, colour);
     }
 }
+
+#endif

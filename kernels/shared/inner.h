@@ -1,6 +1,12 @@
 // Samples of packets whose lanes are all at least INNER_MARGIN voxels away from the box's faces: no clamps. A place is
 // given by inner_place, and values are in units of INNER_UNIT. Bytes and words are weighed in whole numbers, with weights of 15 bits that
 // add up to all of it: exact to some 2^-15 of their differences, and the same to the last bit for any number of lanes.
+#ifndef SHARED_INNER_H
+#define SHARED_INNER_H
+
+#include "shared/lanes.h"
+#include "shared/volume.h"
+
 #define INNER_MARGIN 1.51f
 // A gradient by central differences comes in units of this a voxel.
 #define GRADIENT_UNIT (0.5f * INNER_UNIT)
@@ -228,3 +234,5 @@ static inline Real3 inner_place(Real3 p) {
     Real3 place = inner_way(real3(p.x - 0.5f, p.y - 0.5f, p.z - 0.5f));
     return real3(place.x + INNER_ROUNDING, place.y + INNER_ROUNDING, place.z + INNER_ROUNDING);
 }
+
+#endif

@@ -5,6 +5,8 @@
 //   Real3             three Reals; lane types have no vector form of their own
 //   any_lane(mask)    whether any lane says yes
 // select(no, yes, mask) is OpenCL's own and means the same for LANES 1 and more.
+#ifndef SHARED_LANES_H
+#define SHARED_LANES_H
 
 #if LANES == 1
 #define LANES_SUFFIX
@@ -274,3 +276,5 @@ static inline Real power(Real x, float y) {
     }
     return part > 0.0f ? result * mad((Real)(part), x - 1.0f, (Real)(1.0f)) : result;
 }
+
+#endif

@@ -5,6 +5,12 @@
 //   LIGHT_SPHERE  radiance of its outside; place, radius
 //   LIGHT_QUAD    radiance of both sides; corner, edges
 // and a sky that is between its zenith and its horizon. Lights do not hide each other, nor anything else.
+#ifndef SHARED_LIGHT_H
+#define SHARED_LIGHT_H
+
+#include "shared/lanes.h"
+#include "shared/phase.h"
+
 #define LIGHT_NUMBERS 16
 #define LIGHT_SUN 0
 #define LIGHT_POINT 1
@@ -150,3 +156,5 @@ static inline Real3 sky_of(constant const Scattering *params, Real3 d) {
     return real3(MIX(0), MIX(1), MIX(2));
     #undef MIX
 }
+
+#endif

@@ -1,6 +1,13 @@
 // What a photon flies through: a box of media, cut by walls (walls.h). GEOMETRY says where a medium is,
 //   BOX      one everywhere               LABELS   one per voxel, by its number
 //   LAYERS   one per layer along z        DENSITY  one whose extinction is times a voxel's density
+#ifndef SHARED_MEDIUM_H
+#define SHARED_MEDIUM_H
+
+#include "shared/lanes.h"
+#include "shared/phase.h"
+#include "shared/walls.h"
+
 #define BOX 0
 #define LAYERS 1
 #define LABELS 2
@@ -144,3 +151,5 @@ static inline Real collision_rate(constant const PhotonTransport *params, global
     return extinction_at(params, table, medium, c, p);
 #endif
 }
+
+#endif

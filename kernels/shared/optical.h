@@ -1,5 +1,11 @@
 // The transfer function on the device: a table of colours and opacities by value, and behind it the few polynomials that take its place
 // where it is smooth but for some kinks.
+#ifndef SHARED_OPTICAL_H
+#define SHARED_OPTICAL_H
+
+#include "shared/lanes.h"
+#include "shared/voxel.h"
+
 #define TABLE_SIZE 4096
 
 typedef struct { Real3 colour; Real alpha; } Optical;
@@ -133,3 +139,5 @@ static inline Optical classify(constant const EmissionAbsorption *params, global
 #endif
     return optical_at(table, s, form_of(s), place);
 }
+
+#endif

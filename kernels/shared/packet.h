@@ -2,6 +2,16 @@
 // find each other's voxels in the nearest cache. All rays take their samples on one grid of steps: sample k stands for
 // k h <= t <= (k + 1) h and lies at (k + jitter) h, each pixel with a jitter of its own. So what is empty is skipped for a
 // whole beam by one scalar walk along its middle, and the picture is the one without skipping.
+#ifndef SHARED_PACKET_H
+#define SHARED_PACKET_H
+
+#include "shared/block.h"
+#include "shared/camera.h"
+#include "shared/inner.h"
+#include "shared/lanes.h"
+#include "shared/rng.h"
+#include "shared/shade.h"
+#include "shared/volume.h"
 
 #if LANES == 1
 #define BEAM_W 1
@@ -13,8 +23,6 @@
 #define PACKETS (BEAM_W * BEAM_H)
 // Samples between two looks at the cells and at which packets are still going.
 #define STRIDE 8
-
-#define MAX_LIGHTS 4
 
 typedef struct {
     Int column, row;      // in this pass's pixels
@@ -200,3 +208,5 @@ static inline Mask edge_sample(constant const View *view, const Packet *p, int k
     *t = mad(*length, p->jitter, from);
     return MASK(*length > 0.0f);
 }
+
+#endif

@@ -1,4 +1,13 @@
 // Walls: how far ahead they are, and what becomes of photons that have come to one.
+#ifndef SHARED_PASSAGE_H
+#define SHARED_PASSAGE_H
+
+#include "shared/fresnel.h"
+#include "shared/lanes.h"
+#include "shared/medium.h"
+#include "shared/photon.h"
+#include "shared/tally.h"
+#include "shared/walls.h"
 
 // Counts what leaves the box by a face, by its radius from the beam's axis and its angle to the face.
 static inline void leave(constant const PhotonTransport *params, global const float *table, global ulong *ledger, Gains *gains,
@@ -127,3 +136,5 @@ static inline Mask cross(constant const FieldPass *pass, constant const PhotonTr
 #endif
     return gone;
 }
+
+#endif

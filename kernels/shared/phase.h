@@ -3,6 +3,11 @@
 //   PHASE_LOBES      g1, g2, weight of g1: two Henyey-Greenstein lobes (one: weight 1; isotropic: g1 = 0)
 //   PHASE_RAYLEIGH   none
 //   PHASE_TABLE      where its rows start in the table, their number: rows (cosine, density, cumulative), linear between them
+#ifndef SHARED_PHASE_H
+#define SHARED_PHASE_H
+
+#include "shared/lanes.h"
+
 #define PHASE_LOBES 0
 #define PHASE_RAYLEIGH 1
 #define PHASE_TABLE 2
@@ -128,3 +133,5 @@ static inline Real phase_density(global const float *table, const Medium *m, Rea
     }
     return density;
 }
+
+#endif

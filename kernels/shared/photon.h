@@ -1,4 +1,15 @@
 // A packet of photons: one a lane. Places and ways are in mm from the box's corner.
+#ifndef SHARED_PHOTON_H
+#define SHARED_PHOTON_H
+
+#include "shared/fresnel.h"
+#include "shared/lanes.h"
+#include "shared/medium.h"
+#include "shared/phase.h"
+#include "shared/rng.h"
+#include "shared/tally.h"
+#include "shared/walls.h"
+
 typedef struct {
     Real3 p, d;          // d of unit length
     Cell cell;
@@ -147,3 +158,5 @@ static inline void enter(constant const PhotonTransport *params, global const fl
     Mask inner = bent & MASK(photon->weight > 0.0f);
     photon->d = select3(photon->d, scale3(photon->d, rsqrt(fmax(dot3(photon->d, photon->d), (Real)(1e-20f)))), inner);
 }
+
+#endif

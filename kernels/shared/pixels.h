@@ -1,4 +1,8 @@
 // Pixels of a film in lanes: LANES neighbours of a row at a time, and their sRGB bytes.
+#ifndef SHARED_PIXELS_H
+#define SHARED_PIXELS_H
+
+#include "shared/lanes.h"
 
 // Linear, premultiplied colour and alpha of the pixels from `pixel` on: interleaved in memory, four numbers each.
 #if LANES == 1
@@ -107,3 +111,5 @@ static inline Int picture_bytes(constant Develop *d, global const uchar *curve, 
     *clipped += count_clipped(colour, lanes);
     return srgb(curve, colour.x) | srgb(curve, colour.y) << 8 | srgb(curve, colour.z) << 16 | last << 24;
 }
+
+#endif

@@ -1,6 +1,10 @@
 // Counter-based random numbers: Philox4x32-10 (Salmon, Moraes, Dror, Shaw: "Parallel Random Numbers: As Easy as
 // 1, 2, 3", SC'11). A number is a pure function of (seed; index, sample, dimension), so a result does not depend on
 // the number of threads, the slices or the load.
+#ifndef SHARED_RNG_H
+#define SHARED_RNG_H
+
+#include "shared/lanes.h"
 
 typedef struct { UInt a, b, c, d; } UInt4Lanes;
 
@@ -56,3 +60,5 @@ static inline Real free_depth(UInt number) {
     q = mad(q, f, (Real)(0.199630618f)), q = mad(q, f, (Real)(-0.250013381f)), q = mad(q, f, (Real)(0.333339095f));
     return mad(to_real(e), (Real)(-0.693147181f), -mad(f * f, mad(q, f, (Real)(-0.5f)), f));
 }
+
+#endif

@@ -1,4 +1,10 @@
 // Light on a gradient: two-sided Lambert and Blinn-Phong (Blinn, SIGGRAPH 1977), with lights from infinity.
+#ifndef SHARED_SHADE_H
+#define SHARED_SHADE_H
+
+#include "shared/lanes.h"
+
+#define MAX_LIGHTS 4
 
 // The gradient in the world from the one in index units: a covector.
 static inline Real3 gradient_world(constant const View *view, Real3 g) {
@@ -43,3 +49,5 @@ static inline Real3 shade(constant const View *view, Real3 g, float unit, const 
     }
     return real3(mad(colour.x, body.x, shine.x), mad(colour.y, body.y, shine.y), mad(colour.z, body.z, shine.z));
 }
+
+#endif

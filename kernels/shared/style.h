@@ -1,7 +1,14 @@
-#if STYLED
 // What a sample looks like beyond its transfer function: opacity by gradient and by angle, colour by curvature, light by tone
 // and through thin tissue. All of it is per sample, so it holds for any interpolation.
+#ifndef SHARED_STYLE_H
+#define SHARED_STYLE_H
 
+#include "shared/curvature.h"
+#include "shared/lanes.h"
+#include "shared/shade.h"
+#include "shared/volume.h"
+
+#if STYLED
 typedef struct { Real3 gradient, slope, normal, ray; Real magnitude, facing; Mask flat; Curvature bend; } Surface;
 
 // The surface through p: `gradient` in raw values per world unit, `slope` in raw values per voxel, `normal` towards lower values, `facing` = |normal . ray|.
@@ -105,4 +112,6 @@ static inline Real3 styled_colour(constant const View *view, constant const Emis
     }
     return colour;
 }
+#endif
+
 #endif

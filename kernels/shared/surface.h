@@ -1,4 +1,9 @@
 // The volume's faces, where its refractive index differs from the outside's. Radiance over the squared index is what goes through.
+#ifndef SHARED_SURFACE_H
+#define SHARED_SURFACE_H
+
+#include "shared/fresnel.h"
+#include "shared/lanes.h"
 
 // The unit normal of the faces across an axis of the volume, in the world.
 static inline Real3 face_normal(constant const View *view, Int axis) {
@@ -30,3 +35,5 @@ static inline Int face_at(constant const View *view, Real3 p) {
     Int axis = select((Int)(0), (Int)(1), MASK(y < x));
     return select(axis, (Int)(2), MASK(z < fmin(x, y)));
 }
+
+#endif

@@ -1,4 +1,9 @@
 // Sums that do not depend on the order of addition: 64-bit integers in units of 2^-30.
+#ifndef SHARED_TALLY_H
+#define SHARED_TALLY_H
+
+#include "shared/lanes.h"
+
 #define FIXED_ONE 1073741824.0f
 
 static inline ULong fixed(Real amount) { return ulong_rounded(amount * FIXED_ONE); }
@@ -45,3 +50,5 @@ static inline void gains_flush(global ulong *ledger, const Gains *g) {
     tally_fixed(ledger, (Int)(LEDGER_SCATTERINGS), ulong_from(g->scatterings), (Mask)(-1));
     tally_fixed(ledger, (Int)(LEDGER_PATH), g->path, (Mask)(-1));
 }
+
+#endif

@@ -2,6 +2,11 @@
 // with one lane a work-item is one of a tile's pixels. `tiles` says which: how many, the number of their next sample, and whether a list
 // follows instead: for each the tile, the number of its next sample, and how many it gets. Behind room for all of them stands what each
 // tile has cost so far, in steps of its packets.
+#ifndef SHARED_TILE_H
+#define SHARED_TILE_H
+
+#include "shared/lanes.h"
+
 #define TILE 16
 #if LANES == 1
 #define ITEM 1
@@ -54,3 +59,5 @@ static inline Mask take_pixels(constant const View *view, Tile tile, Mask alive,
     *column = tile.left + next.v % ITEM, *row = tile.top + next.v / ITEM;
     return ~alive & MASK(next.v < ITEM * ITEM) & MASK(*column < view->width) & MASK(*row < view->height);
 }
+
+#endif

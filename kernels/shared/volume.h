@@ -1,5 +1,10 @@
 // A volume in its own voxel type, x fastest. Index coordinates are cell-cornered: voxel i has its centre at i + 0.5 and
 // the box is [0, n]; outside the outermost centres the edge value holds. The buffer is padded by 8 zero bytes.
+#ifndef SHARED_VOLUME_H
+#define SHARED_VOLUME_H
+
+#include "shared/lanes.h"
+#include "shared/voxel.h"
 
 // INTERPOLATION: how values lie between voxels.
 #define NEAREST 0
@@ -169,3 +174,5 @@ static inline Real3 gradient_raw(constant const View *view, VOLUME voxels, Real3
     g.z = sample_raw(view, voxels, real3(p.x, p.y, p.z + 1.0f)) - sample_raw(view, voxels, real3(p.x, p.y, p.z - 1.0f));
     return scale3(g, (Real)(0.5f));
 }
+
+#endif

@@ -1,4 +1,6 @@
 // The type of a voxel: what a volume has on the device is what its file has.
+#ifndef SHARED_VOXEL_H
+#define SHARED_VOXEL_H
 
 #if VOXEL == VOXEL_U8
 #define VOXEL_BYTES 1
@@ -16,3 +18,5 @@ typedef float Voxel;
 
 // Voxels along an edge of a macro-cell.
 #define CELL 4
+
+#endif

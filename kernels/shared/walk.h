@@ -3,6 +3,11 @@
 // Between two of them the value along a ray is a polynomial in t, of degree 0 (nearest), 3 (trilinear) or 9 (cubic), and
 // Gauss-Legendre with 1, 2 or 5 points integrates it exactly. Beyond the outermost centres the edge value holds, which is
 // a polynomial too. Stretches that touch a NaN count neither in the integral nor in the length.
+#ifndef SHARED_WALK_H
+#define SHARED_WALK_H
+
+#include "shared/lanes.h"
+#include "shared/volume.h"
 
 #if INTERPOLATION == NEAREST
 #define WALK_PLANE 0.0f
@@ -177,3 +182,5 @@ static inline Walk walk(constant const View *view, VOLUME voxels, float sign, in
     }
     return w;
 }
+
+#endif

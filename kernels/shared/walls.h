@@ -6,6 +6,11 @@
 //            (Woodcock et al., ANL-7050, 1965)
 //   WEIGHTED the same where m may be too small: real with probability P = sigma / (sigma + |m - sigma|), weight times
 //            sigma / (m P) or (m - sigma) / (m (1 - P)) (Galtier et al., JQSRT 125, 2013)
+#ifndef SHARED_WALLS_H
+#define SHARED_WALLS_H
+
+#include "shared/lanes.h"
+
 #define EXACT 0
 #define MARCH 1
 #define DELTA 2
@@ -41,4 +46,6 @@ static inline Mask real_collisions(Real sigma, Real rate, Real u, Mask hit, Real
     return real;
 #endif
 }
+#endif
+
 #endif

@@ -1,4 +1,10 @@
 // Window, level and colour map: a table of linear colours, four floats an entry, linear between entries (src/scene/window.rs).
+#ifndef SHARED_WINDOW_H
+#define SHARED_WINDOW_H
+
+#include "shared/film.h"
+#include "shared/lanes.h"
+#include "shared/packet.h"
 
 #define WINDOW_SIZE 1024
 
@@ -22,3 +28,5 @@ static inline void film_value(constant const View *view, global float *film, glo
     Real3 black = real3((Real)(0.0f), (Real)(0.0f), (Real)(0.0f));
     film_packet(view, film, counts, p->column, p->row, select3(black, colour, shown), select((Real)(0.0f), (Real)(1.0f), shown));
 }
+
+#endif

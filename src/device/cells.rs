@@ -30,15 +30,7 @@ fn variant(kernel: &'static str, voxel: VoxelType) -> Variant {
 }
 
 fn source(kernel: &'static str, arguments: usize, variants: fn() -> Vec<Variant>) -> Source {
-    Source {
-        kernel,
-        headers: &["shared/voxel.h"],
-        structs: CellsPass::opencl_text,
-        arguments,
-        volume: None,
-        variants,
-        common: VoxelType::ALL.len(),
-    }
+    Source { kernel, structs: CellsPass::opencl_text, arguments, volume: None, variants, common: VoxelType::ALL.len() }
 }
 
 /// The kernels of the cells.

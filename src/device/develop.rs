@@ -84,7 +84,6 @@ fn variant(whole: bool) -> Variant {
 pub fn source() -> Source {
     Source {
         kernel: "develop",
-        headers: &["shared/lanes.h", "shared/pixels.h"],
         structs: Develop::opencl_text,
         arguments: 7,
         volume: None,

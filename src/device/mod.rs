@@ -5,6 +5,7 @@
 pub mod cells;
 pub mod develop;
 mod images;
+mod include;
 mod level;
 pub mod program;
 mod select;

@@ -1,12 +1,10 @@
 //! The kernels' text and the variants that may be built: all of them are listed, none is made up at run time.
 
-use include_dir::{Dir, include_dir};
 use std::path::Path;
 
-use crate::error::{Error, Result};
+use super::include::{assemble, read};
+use crate::error::Result;
 use crate::volume::VoxelType;
-
-static KERNELS: Dir = include_dir!("$CARGO_MANIFEST_DIR/kernels");
 
 /// One permitted build of one kernel file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -24,8 +22,6 @@ pub struct Variant {
 pub struct Source {
     /// The kernel file's name, without `.cl`.
     pub kernel: &'static str,
-    /// Shared headers in order, such as `shared/lanes.h`.
-    pub headers: &'static [&'static str],
     /// The OpenCL C text of its device structs.
     pub structs: fn() -> String,
     /// How many buffers the kernel takes.
@@ -38,28 +34,14 @@ pub struct Source {
     pub common: usize,
 }
 
-fn read(overrides: Option<&Path>, name: &str) -> Result<String> {
-    if let Some(dir) = overrides {
-        return std::fs::read_to_string(dir.join(name))
-            .map_err(|e| Error::internal(format!("kernel file {name}: {e}")));
-    }
-    let file =
-        KERNELS.get_file(name).ok_or_else(|| Error::internal(format!("kernel file {name} is not in the binary")))?;
-    file.contents_utf8().map(str::to_owned).ok_or_else(|| Error::internal(format!("kernel file {name} is not UTF-8")))
-}
-
 impl Source {
-    /// The whole text in one string: opencl3 crashes on several, so each part starts with a `#line` of its own.
+    /// The whole text in one string: the structs, then the kernel file with all that it includes.
     ///
     /// # Errors
-    /// [`Error::Internal`] when a file is missing.
+    /// [`Error::Internal`](crate::error::Error::Internal) when a file is missing, or files include each other in a circle.
     pub fn text(&self, overrides: Option<&Path>) -> Result<String> {
-        let mut text = format!("#line 1 \"structs\"\n{}", (self.structs)());
-        let main = format!("{}.cl", self.kernel);
-        for name in self.headers.iter().copied().chain([main.as_str()]) {
-            text += &format!("#line 1 \"kernels/{name}\"\n{}\n", read(overrides, name)?);
-        }
-        Ok(text)
+        let kernel = assemble(&format!("{}.cl", self.kernel), &|name| read(overrides, name))?;
+        Ok(format!("#line 1 \"structs\"\n{}{kernel}", (self.structs)()))
     }
 }
 

@@ -33,38 +33,6 @@ pub const ALL: &[Technique] = &[
     volume_path::TECHNIQUE,
 ];
 
-/// The kernel headers that every view is built with, in order.
-pub(crate) const VIEW_HEADERS: &[&str] = &[
-    "shared/lanes.h",
-    "shared/rng.h",
-    "shared/camera.h",
-    "shared/voxel.h",
-    "shared/volume.h",
-    "shared/inner.h",
-    "shared/block.h",
-    "shared/packet.h",
-    "shared/optical.h",
-    "shared/shade.h",
-    "shared/curvature.h",
-    "shared/style.h",
-    "shared/film.h",
-];
-
-/// The kernel headers of views that show a value by window and colour map.
-pub(crate) const VALUE_HEADERS: &[&str] = &[
-    "shared/lanes.h",
-    "shared/rng.h",
-    "shared/camera.h",
-    "shared/voxel.h",
-    "shared/volume.h",
-    "shared/inner.h",
-    "shared/block.h",
-    "shared/packet.h",
-    "shared/film.h",
-    "shared/window.h",
-    "shared/walk.h",
-];
-
 /// What the service knows of a technique.
 pub struct Technique {
     /// Its name: of its Rust file, its kernel, its test, and in a request.

@@ -94,19 +94,6 @@ pub fn example() -> Value {
 fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
-        headers: &[
-            "shared/lanes.h",
-            "shared/rng.h",
-            "shared/phase.h",
-            "shared/fresnel.h",
-            "shared/walls.h",
-            "shared/medium.h",
-            "shared/tally.h",
-            "shared/deposit.h",
-            "shared/photon.h",
-            "shared/passage.h",
-            "shared/compton.h",
-        ],
         structs: || {
             "#pragma OPENCL EXTENSION cl_khr_int64_base_atomics : enable\n\
              #define TALLY_ABSORBED 0\n#define TALLY_FLUENCE 1\n#define TALLY_FLUENCE_TRACK 2\n#define TALLY_GATHER 3\n\

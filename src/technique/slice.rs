@@ -173,7 +173,6 @@ fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
 fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
-        headers: super::VALUE_HEADERS,
         structs: || DeviceView::opencl_text() + &Slice::opencl_text(),
         arguments: 7,
         volume: Some(2),

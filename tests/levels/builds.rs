@@ -1,5 +1,6 @@
 //! Every kernel compiles for every level without a warning.
 
+use std::path::Path;
 use std::sync::OnceLock;
 use std::time::Instant;
 
@@ -81,6 +82,30 @@ fn every_variant_builds_at_every_level() {
     all_build(&jobs);
 }
 
+/// Compiles a program of one header, with the structs and a variant of a kernel that includes it.
+fn build_alone(header: &str) -> Result<bool, String> {
+    let includes = |s: &Source| s.text(None).unwrap().contains(&format!("#line 1 \"kernels/shared/{header}\""));
+    let source = sources().into_iter().find(includes).unwrap_or_else(|| panic!("no kernel includes {header}"));
+    let folder = tempfile::tempdir().unwrap();
+    let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("kernels/shared");
+    std::os::unix::fs::symlink(shared, folder.path().join("shared")).unwrap();
+    let program = format!("#include \"shared/{header}\"\nkernel void alone(global int *out) {{ out[0] = 1; }}\n");
+    std::fs::write(folder.path().join(format!("{}.cl", source.kernel)), program).unwrap();
+    let text = source.text(Some(folder.path())).unwrap();
+    let options = (source.variants)()[0].options(LEVELS[0].lanes, false, true);
+    compiler().compile_once(&LEVELS[0], &options, &text).map_err(|said| format!("{header} alone:\n{said}"))
+}
+
+#[test]
+fn every_header_builds_alone() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("kernels/shared");
+    let names = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let headers: Vec<String> = names.collect();
+    let faults: Vec<String> = headers.par_iter().filter_map(|header| build_alone(header).err()).collect();
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+    assert!(headers.len() > 20, "{} headers", headers.len());
+}
+
 /// A kernel that hands `ulong`s a lane from one function to another.
 fn wide(lanes: u32) -> String {
     format!(
@@ -111,7 +136,6 @@ fn a_vector_wider_than_the_registers_fails_where_it_is_wider() {
 fn a_warning_fails_the_build_and_names_the_level() {
     let source = Source {
         kernel: "cells",
-        headers: &["shared/voxel.h"],
         structs: || "kernel void sloppy(global int *out) { if (out = out) *out = 1; }\n".into(),
         arguments: 1,
         volume: None,

@@ -12,7 +12,7 @@ use crate::scene::interpolation::Interpolation;
 use crate::scene::presets;
 use crate::scene::transfer::{TABLE_SIZE, TransferFunction, pack};
 use crate::technique::steps::coarse_step;
-use crate::technique::{CellUse, VIEW_HEADERS, View, ViewPlan};
+use crate::technique::{CellUse, View, ViewPlan};
 use crate::volume::{Volume, VoxelType};
 
 type Features = [(&'static str, i32); 5];
@@ -65,7 +65,6 @@ fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
 pub(super) fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
-        headers: VIEW_HEADERS,
         structs: || DeviceView::opencl_text() + &EmissionAbsorption::opencl_text(),
         arguments: 7,
         volume: Some(2),

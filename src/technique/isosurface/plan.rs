@@ -49,19 +49,6 @@ fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
 pub(super) fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
-        headers: &[
-            "shared/lanes.h",
-            "shared/rng.h",
-            "shared/camera.h",
-            "shared/voxel.h",
-            "shared/volume.h",
-            "shared/inner.h",
-            "shared/block.h",
-            "shared/packet.h",
-            "shared/shade.h",
-            "shared/crossing.h",
-            "shared/film.h",
-        ],
         structs: || DeviceView::opencl_text() + &Isosurface::opencl_text(),
         arguments: 7,
         volume: Some(2),

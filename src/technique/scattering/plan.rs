@@ -47,21 +47,6 @@ const MEAN_OF: usize = 4096;
 pub(in crate::technique) fn source(kernel: &'static str) -> Source {
     Source {
         kernel,
-        headers: &[
-            "shared/lanes.h",
-            "shared/rng.h",
-            "shared/camera.h",
-            "shared/voxel.h",
-            "shared/volume.h",
-            "shared/phase.h",
-            "shared/fresnel.h",
-            "shared/walls.h",
-            "shared/film.h",
-            "shared/flight.h",
-            "shared/light.h",
-            "shared/surface.h",
-            "shared/tile.h",
-        ],
         structs: || {
             "#pragma OPENCL EXTENSION cl_khr_int64_base_atomics : enable\n".to_owned()
                 + &DeviceView::opencl_text()
