@@ -228,22 +228,22 @@ static inline int enlarge(constant Develop *d, global const float *film, global 
 }
 #endif
 
-kernel void develop(constant Develop *d, global const float *film, global const float *control, global const uint *counts,
+kernel void develop(constant Develop *settings, global const float *film, global const float *control, global const uint *counts,
                     global const uchar *curve, global uchar *picture, global float *sums) {
     int item = (int)get_global_id(0);
-    int blocks = (d->width + ACROSS - 1) / ACROSS * ((d->height + 1) / 2);
+    int blocks = (settings->width + ACROSS - 1) / ACROSS * ((settings->height + 1) / 2);
     if (item < blocks) {
-        of_film(d, film, counts, curve, picture, item, sums + SUMS * item);
+        of_film(settings, film, counts, curve, picture, item, sums + SUMS * item);
         return;
     }
     global float *own = sums + SUMS * item;
     item -= blocks;
-    if (item < d->control_height) {
-        of_control(d, film, control, counts, item, own);
+    if (item < settings->control_height) {
+        of_control(settings, film, control, counts, item, own);
         return;
     }
 #if !WHOLE
-    item -= d->control_height;
-    if (item < d->picture_height) own[0] = (float)enlarge(d, film, curve, picture, item);
+    item -= settings->control_height;
+    if (item < settings->picture_height) own[0] = (float)enlarge(settings, film, curve, picture, item);
 #endif
 }

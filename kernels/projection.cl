@@ -48,7 +48,7 @@ static inline void project(constant const View *view, constant const Projection 
 #define PARTS 64
 
 // No sample of the beam in the steps first..last has a greater sign * raw value.
-static inline float part_bound(constant const View *view, constant const Projection *params, global const uchar *cells, const Beam *b, int first,
+static inline float part_bound(constant const View *view, constant const Projection *params, global const uchar *ranges, const Beam *b, int first,
                                int last) {
 #if INTERPOLATION == CATMULL_ROM
     return INFINITY; // overshoots what the cells say
@@ -63,12 +63,12 @@ static inline float part_bound(constant const View *view, constant const Project
         from[i] = clamp((int)((fmin(p, q) - b->reach[i] - wider) * (1.0f / CELL)), 0, count[i] - 1);
         to[i] = clamp((int)((fmax(p, q) + b->reach[i] + wider) * (1.0f / CELL)), 0, count[i] - 1);
     }
-    global const Voxel *ranges = (global const Voxel *)cells + (params->sign > 0.0f ? 1 : 0);
-    Voxel least = ranges[2 * ((from[2] * count[1] + from[1]) * count[0] + from[0])], greatest = least;
+    global const Voxel *ends = (global const Voxel *)ranges + (params->sign > 0.0f ? 1 : 0);
+    Voxel least = ends[2 * ((from[2] * count[1] + from[1]) * count[0] + from[0])], greatest = least;
     for (int z = from[2]; z <= to[2]; z++)
         for (int y = from[1]; y <= to[1]; y++)
             for (int x = from[0]; x <= to[0]; x++) {
-                Voxel v = ranges[2 * ((z * count[1] + y) * count[0] + x)];
+                Voxel v = ends[2 * ((z * count[1] + y) * count[0] + x)];
                 least = v < least ? v : least;
                 greatest = v > greatest ? v : greatest;
             }
@@ -99,7 +99,7 @@ static inline void take_steps(constant const View *view, constant const Projecti
 }
 #endif
 
-kernel void projection(constant View *view, constant Projection *params, VOLUME voxels, global const uchar *cells,
+kernel void projection(constant View *view, constant Projection *params, VOLUME voxels, global const uchar *ranges,
                        global const uchar *table, global float *film, global uint *counts) {
     int number = view->first_beam + (int)get_global_id(0);
     if (number >= beams(view)) return;
@@ -119,7 +119,7 @@ kernel void projection(constant View *view, constant Projection *params, VOLUME 
         int parts = min((beam.end - begin + PART - 1) / PART, PARTS);
         for (int i = 0; i < parts; i++) {
             int first = begin + i * PART;
-            bound[i] = params->skipping ? part_bound(view, params, cells, &beam, first, min(first + PART, beam.end) - 1) : INFINITY;
+            bound[i] = params->skipping ? part_bound(view, params, ranges, &beam, first, min(first + PART, beam.end) - 1) : INFINITY;
         }
         for (int done = 0; done < parts; done++) {
             int next = 0;

@@ -192,10 +192,9 @@ static inline void arrive(constant const Scattering *params, global const float 
     if (!(params->sky && params->sky_visible)) s->alpha = select(s->alpha, 1.0f - (arrives.x + arrives.y + arrives.z) * (1.0f / 3.0f), first);
 }
 
-kernel void single_scatter(constant View *view, constant Scattering *params, VOLUME voxels, global const uchar *ranges, global const uchar *rows,
+kernel void single_scatter(constant View *view, constant Scattering *params, VOLUME voxels, global const uchar *ranges, global const float *table,
                            global float *film, global uint *counts, global uint *tiles) {
     Tile tile = tile_at(view, tiles);
-    global const float *table = (global const float *)rows;
     Sample s;
     Flight *f = &s.flight;
     Real zero = (Real)(0.0f);

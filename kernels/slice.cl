@@ -38,7 +38,7 @@ static inline void cut(constant const View *view, constant const Slice *params, 
     film_value(view, film, counts, p, table, params->window_scale, params->window_offset, params->raw_values, value, shown);
 }
 
-kernel void slice(constant View *view, constant Slice *params, VOLUME voxels, global const uchar *cells, global const uchar *table,
+kernel void slice(constant View *view, constant Slice *params, VOLUME voxels, global const uchar *distances, global const uchar *table,
                   global float *film, global uint *counts) {
     int number = view->first_beam + (int)get_global_id(0);
     if (number >= beams(view)) return;

@@ -144,10 +144,9 @@ static inline Mask arrive(constant const View *view, constant const Scattering *
     return out;
 }
 
-kernel void volume_path(constant View *view, constant Scattering *params, VOLUME voxels, global const uchar *ranges, global const uchar *rows,
+kernel void volume_path(constant View *view, constant Scattering *params, VOLUME voxels, global const uchar *ranges, global const float *table,
                         global float *film, global uint *counts, global uint *tiles) {
     Tile tile = tile_at(view, tiles);
-    global const float *table = (global const float *)rows;
     Path path;
     Flight *f = &path.flight;
     Real zero = (Real)(0.0f);

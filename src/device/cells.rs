@@ -26,18 +26,18 @@ device_struct! {
 }
 
 fn variant(kernel: &'static str, voxel: VoxelType) -> Variant {
-    Variant { kernel, voxel: Some(voxel), features: &[] }
+    Variant::new(kernel, Some(voxel), &[])
 }
 
-fn source(kernel: &'static str, arguments: usize, variants: fn() -> Vec<Variant>) -> Source {
-    Source { kernel, structs: CellsPass::opencl_text, arguments, volume: None, variants, common: VoxelType::ALL.len() }
+fn source(kernel: &'static str, variants: fn() -> Vec<Variant>) -> Source {
+    Source { kernel, structs: CellsPass::opencl_text, variants, common: VoxelType::ALL.len() }
 }
 
 /// The kernels of the cells.
 pub fn sources() -> [Source; 2] {
     [
-        source("cells", 3, || VoxelType::ALL.map(|t| variant("cells", t)).to_vec()),
-        source("distances", 5, || VoxelType::ALL.map(|t| variant("distances", t)).to_vec()),
+        source("cells", || VoxelType::ALL.map(|t| variant("cells", t)).to_vec()),
+        source("distances", || VoxelType::ALL.map(|t| variant("distances", t)).to_vec()),
     ]
 }
 
@@ -67,7 +67,7 @@ impl Cells {
         // Lanes load whole words.
         let ranges = device.allocate(2 * voxel.bytes() * wide * high * deep + 8)?;
         let pass = device.upload(bytemuck::bytes_of(&pass(voxel_dims, 0, 0, 0.0)), 0)?;
-        device.run(&kernel, &[&pass, voxels, &ranges], high * deep)?;
+        device.run(&kernel, &[("pass", &pass), ("voxels", voxels), ("ranges", &ranges)], high * deep)?;
         Ok(Self { ranges, voxel_dims, voxel })
     }
 
@@ -91,7 +91,9 @@ impl Cells {
         for (axis, lines, from, to) in [(0, high * deep, &b, &a), (1, wide * deep, &a, &b), (2, wide * high, &b, &a)] {
             let pass =
                 device.upload(bytemuck::bytes_of(&pass(self.voxel_dims, axis, intervals.len(), overshoot)), 0)?;
-            device.run(&kernel, &[&pass, &wanted, &self.ranges, from, to], lines)?;
+            let arguments =
+                [("pass", &pass), ("intervals", &wanted), ("ranges", &self.ranges), ("from", from), ("to", to)];
+            device.run(&kernel, &arguments, lines)?;
         }
         Ok(a)
     }

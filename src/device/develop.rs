@@ -77,7 +77,7 @@ pub struct Look {
 }
 
 fn variant(whole: bool) -> Variant {
-    Variant { kernel: "develop", voxel: None, features: if whole { &[("WHOLE", 1)] } else { &[("WHOLE", 0)] } }
+    Variant::new("develop", None, if whole { &[("WHOLE", 1)] } else { &[("WHOLE", 0)] })
 }
 
 /// The kernel.
@@ -85,8 +85,6 @@ pub fn source() -> Source {
     Source {
         kernel: "develop",
         structs: Develop::opencl_text,
-        arguments: 7,
-        volume: None,
         variants: || [true, false].map(variant).to_vec(),
         common: 2,
     }
@@ -164,13 +162,13 @@ impl Developer {
         let counts =
             main.samples.tiles.as_ref().map(|t| device.upload(bytemuck::cast_slice(&t.counts), 0)).transpose()?;
         let arguments = [
-            &self.settings,
-            main.buffer,
-            control.map_or(main.buffer, |c| c.buffer),
-            counts.as_ref().unwrap_or(&self.sums),
-            &self.curve,
-            &self.picture,
-            &self.sums,
+            ("settings", &self.settings),
+            ("film", main.buffer),
+            ("control", control.map_or(main.buffer, |c| c.buffer)),
+            ("counts", counts.as_ref().unwrap_or(&self.sums)),
+            ("curve", &*self.curve),
+            ("picture", &self.picture),
+            ("sums", &self.sums),
         ];
         device.run(&variant(whole), &arguments, items)?;
         let mut numbers = vec![[0.0f32; SUMS]; items];

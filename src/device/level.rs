@@ -12,13 +12,12 @@ const LEVELS: [&str; 7] = ["generic", "NEON", "SSE4.1", "SSE4.2", "AVX", "AVX2",
 /// # Errors
 /// [`Error::Internal`] when the smallest of kernels does not build or run: then none does.
 pub(super) fn of(device: &mut Device) -> Result<&'static str> {
-    let variant = Variant { kernel: "level", voxel: None, features: &[] };
-    let source =
-        Source { kernel: "level", structs: String::new, arguments: 1, volume: None, variants: Vec::new, common: 0 };
+    let variant = Variant::new("level", None, &[]);
+    let source = Source { kernel: "level", structs: String::new, variants: Vec::new, common: 0 };
     device.build(&source, &variant)?;
     let mut number = [0i32];
     let out = device.upload(bytemuck::cast_slice(&number), 0)?;
-    device.run(&variant, &[&out], 1)?;
+    device.run(&variant, &[("out", &out)], 1)?;
     device.read(&out, 0, &mut number)?;
     LEVELS.get(number[0] as usize).copied().ok_or_else(|| Error::internal("an unknown level"))
 }

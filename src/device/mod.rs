@@ -6,26 +6,30 @@ pub mod cells;
 pub mod develop;
 mod images;
 mod include;
+mod launch;
 mod level;
 pub mod program;
 mod select;
+mod signature;
 pub mod structs;
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::ptr;
-use std::time::{Duration, Instant};
 
 use opencl3::command_queue::CommandQueue;
 use opencl3::context::Context;
 use opencl3::kernel::Kernel;
-use opencl3::memory::{Buffer as ClBuffer, CL_MEM_COPY_HOST_PTR, CL_MEM_READ_WRITE, ClMem, Image};
+use opencl3::memory::{Buffer as ClBuffer, CL_MEM_COPY_HOST_PTR, CL_MEM_READ_WRITE, Image};
 use opencl3::program::Program;
-use opencl3::types::{CL_BLOCKING, cl_mem, cl_uchar};
+use opencl3::types::{CL_BLOCKING, cl_uchar};
 
+pub use launch::Range;
 pub use select::{DeviceInfo, NO_DEVICE, list, select};
+pub use signature::Parameter;
 
 use crate::error::{Error, Result};
+use launch::Built;
 use program::{Source, Variant};
 
 /// Uploads below so many bytes are copied where their padding is added.
@@ -84,7 +88,7 @@ pub struct Device {
     context: Context,
     queue: CommandQueue,
     id: opencl3::types::cl_device_id,
-    kernels: HashMap<Variant, Kernel>,
+    kernels: HashMap<Variant, Built>,
     overrides: Option<PathBuf>,
     strict: bool,
 }
@@ -199,8 +203,14 @@ impl Device {
             let log = program.get_build_log(self.id).unwrap_or_default();
             return Err(Error::internal(format!("building {}: {code}\n{log}", variant.label())));
         }
-        let kernel = cl("creating a kernel", Kernel::create(&program, variant.kernel))?;
-        self.kernels.insert(*variant, kernel);
+        let kernel = cl("creating a kernel", Kernel::create(&program, variant.function))?;
+        let parameters = signature::parameters(&text, variant.function)?;
+        let count = cl("asking for the number of arguments", kernel.num_args())?;
+        if count as usize != parameters.len() {
+            let said = format!("{}: {} parameters in its text, {count} compiled", variant.label(), parameters.len());
+            return Err(Error::internal(said));
+        }
+        self.kernels.insert(*variant, Built { kernel, parameters });
         Ok(())
     }
 
@@ -279,36 +289,5 @@ impl Device {
         // SAFETY: the range was checked above, `bytes` is plain data, and the call blocks until it is filled.
         let event = unsafe { self.queue.enqueue_read_buffer(memory, CL_BLOCKING, offset, bytes, &[]) };
         cl("reading a buffer", event).map(drop)
-    }
-
-    /// Runs `items` work-items of a built variant, waits, and says how long the device took. No global offset: PoCL compiles
-    /// a kernel anew for one, at its first launch. The count is rounded up to whole work-groups.
-    /// `arguments` are the kernel's buffers in order; the kernel itself keeps within them and returns at once for items past
-    /// its work.
-    ///
-    /// # Errors
-    /// [`Error::Internal`] when the variant is not built or OpenCL fails.
-    pub fn run(&self, variant: &Variant, arguments: &[&Buffer], items: usize) -> Result<Duration> {
-        let kernel =
-            self.kernels.get(variant).ok_or_else(|| Error::internal(format!("{} is not built", variant.label())))?;
-        for (index, buffer) in arguments.iter().enumerate() {
-            let memory: cl_mem = match &buffer.memory {
-                Memory::Bytes(memory) => memory.get(),
-                Memory::Image(image) => image.get(),
-            };
-            // SAFETY: every kernel argument here is a buffer, and a cl_mem of this context is what clSetKernelArg takes for one.
-            cl("setting an argument", unsafe { kernel.set_arg(index as u32, &memory) })?;
-        }
-        let local = self.info.local_size;
-        let global = [items.div_ceil(local) * local];
-        let started = Instant::now();
-        // SAFETY: the sizes are arrays of one element for one work dimension, alive through the call; no offset is given; the
-        // arguments are set.
-        let event = unsafe {
-            self.queue.enqueue_nd_range_kernel(kernel.get(), 1, ptr::null(), global.as_ptr(), [local].as_ptr(), &[])
-        };
-        cl("launching a kernel", event)?;
-        cl("waiting for the device", self.queue.finish())?;
-        Ok(started.elapsed())
     }
 }

@@ -6,15 +6,20 @@ use super::include::{assemble, read};
 use crate::error::Result;
 use crate::volume::VoxelType;
 
-/// One permitted build of one kernel file.
+/// The `-D NAME=VALUE` options of a variant.
+pub type Features = &'static [(&'static str, i32)];
+
+/// One permitted build of one kernel function.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Variant {
-    /// The technique: the file `kernels/<name>.cl` and the kernel function in it.
+    /// The kernel's file, `kernels/<name>.cl`: that of its [`Source`].
     pub kernel: &'static str,
+    /// The kernel function in it.
+    pub function: &'static str,
     /// The volume's voxel type, where the kernel reads a volume.
     pub voxel: Option<VoxelType>,
     /// Features compiled in, `-D NAME=VALUE`.
-    pub features: &'static [(&'static str, i32)],
+    pub features: Features,
 }
 
 /// What a technique gives to build its kernel from, besides the file itself.
@@ -24,10 +29,6 @@ pub struct Source {
     pub kernel: &'static str,
     /// The OpenCL C text of its device structs.
     pub structs: fn() -> String,
-    /// How many buffers the kernel takes.
-    pub arguments: usize,
-    /// Which of them is the volume, where it may be an image.
-    pub volume: Option<usize>,
     /// Every variant that may be built.
     pub variants: fn() -> Vec<Variant>,
     /// How many of them, from the first, are built before the service is ready; the others when they are first asked for.
@@ -46,6 +47,16 @@ impl Source {
 }
 
 impl Variant {
+    /// A variant of the kernel function that has its file's name.
+    pub const fn new(kernel: &'static str, voxel: Option<VoxelType>, features: Features) -> Self {
+        Self { kernel, function: kernel, voxel, features }
+    }
+
+    /// The same of another kernel function in the file.
+    pub const fn of_function(self, function: &'static str) -> Self {
+        Self { function, ..self }
+    }
+
     /// The build options; `strict` makes warnings errors, as tests do. Not `-cl-fast-relaxed-math`: it would let the compiler
     /// assume that no NaN occurs.
     pub fn options(&self, lanes: u32, images: bool, strict: bool) -> String {
@@ -74,10 +85,11 @@ impl Variant {
         options
     }
 
-    /// A name for logs, such as `emission_absorption u8 SHADED=1`.
+    /// A name for logs, such as `emission_absorption u8 SHADED=1`; a function of another name than its file follows that and a dot.
     pub fn label(&self) -> String {
         let voxel = self.voxel.map(|v| format!(" {v:?}").to_lowercase()).unwrap_or_default();
         let features: String = self.features.iter().map(|(n, v)| format!(" {n}={v}")).collect();
-        format!("{}{voxel}{features}", self.kernel)
+        let function = if self.function == self.kernel { String::new() } else { format!(".{}", self.function) };
+        format!("{}{function}{voxel}{features}", self.kernel)
     }
 }

@@ -69,6 +69,8 @@ const SAMPLER_MODES: &[&str] = &[
     "address repeat (normalised coordinates)",
     "address mirrored_repeat (normalised coordinates)",
 ];
+/// Work-items of a work-group on a GPU.
+pub(super) const GPU_GROUP: usize = 64;
 const FROM_BUFFERS: &str =
     "buffer: interpolated by the kernels in single precision (bytes: weights of 15 bits along x)";
 const FROM_IMAGES: &str = "image: trilinear by the device's sampler, whose weights have 8 fractional bits on a GPU";
@@ -147,7 +149,7 @@ fn describe(platform: &Platform, device: &ClDevice, forced_lanes: Option<u32>) -
         level: "",
         gave_up: Vec::new(),
         // A CPU work-item is already a packet, so a group is only the unit that threads share out; a GPU wants whole warps.
-        local_size: if kind == "gpu" { 64 } else { 4 },
+        local_size: if kind == "gpu" { GPU_GROUP } else { 4 },
     })
 }
 

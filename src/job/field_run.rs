@@ -121,7 +121,13 @@ impl FieldRun {
         context.device.write(&mut self.pass, 0, bytemuck::bytes_of(&pass))?;
         context.device.write(&mut self.ledger, 8 * self.plan.ledger, &[0; 8])?;
         let items = wanted.min(count.div_ceil(per_item) as usize) * stride;
-        let arguments = [&self.pass, &self.parameters, &self.table, &self.grid, &self.ledger];
+        let arguments = [
+            ("pass", &self.pass),
+            ("params", &self.parameters),
+            ("table", &self.table),
+            ("grid", &self.grid),
+            ("ledger", &self.ledger),
+        ];
         let took = context.device.run(&self.plan.variant, &arguments, items)?;
         self.pace.learn(count as usize, 1, took);
         self.device_time += took;

@@ -214,16 +214,20 @@ impl ViewRun {
         self.pass_view.first_beam = self.cursor as i32;
         context.device.write(&mut self.view_buffer, 0, bytemuck::bytes_of(&self.pass_view))?;
         let layer = self.gathered.layer(pass);
+        let cells = match &self.distances {
+            Some(distances) => ("distances", &**distances),
+            None => ("ranges", &self.volume.cells.ranges),
+        };
         let mut arguments = vec![
-            &self.view_buffer,
-            &self.parameters,
-            &self.volume.voxels,
-            self.distances.as_deref().unwrap_or(&self.volume.cells.ranges),
-            &layer.table,
-            &layer.buffer,
-            &self.gathered.counts,
+            ("view", &self.view_buffer),
+            ("params", &self.parameters),
+            ("voxels", &self.volume.voxels),
+            cells,
+            ("table", &*layer.table),
+            ("film", &layer.buffer),
+            ("counts", &self.gathered.counts),
         ];
-        arguments.extend(layer.tiles());
+        arguments.extend(layer.tiles().map(|tiles| ("tiles", tiles)));
         let took = context.device.run(&self.plan.variant, &arguments, items)?;
         self.pace.learn(items, rays, took);
         self.device_time += took;

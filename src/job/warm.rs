@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::compile::Compiler;
 use super::kernels;
 use crate::device::program::Variant;
-use crate::device::{Buffer, Device};
+use crate::device::{Buffer, Device, Parameter};
 use crate::error::{Error, Result};
 use crate::volume::Voxels;
 
@@ -20,11 +20,17 @@ pub(super) fn warm(device: &mut Device, variant: &Variant) -> Result<()> {
     let source = kernels::source_of(variant)?;
     device.build(&source, variant)?;
     // Zeroed buffers ask for an image of no pixels or a launch of no histories: compiled, and nothing done.
-    let mut zero: Vec<Buffer> = (0..source.arguments).map(|_| device.upload(&[0; 1024], 0)).collect::<Result<_>>()?;
-    if let (Some(volume), true) = (source.volume, device.info().volumes_are_images) {
-        zero[volume] = device.upload_image(&Voxels::U8(vec![0]), [1; 3])?;
-    }
-    device.run(variant, &zero.iter().collect::<Vec<_>>(), 1)?;
+    let zero = |parameter: &Parameter| -> Result<Buffer> {
+        if parameter.is_volume && device.info().volumes_are_images {
+            device.upload_image(&Voxels::U8(vec![0]), [1; 3])
+        } else {
+            device.upload(&[0; 1024], 0)
+        }
+    };
+    let parameters = device.parameters(variant)?;
+    let buffers: Vec<Buffer> = parameters.iter().map(zero).collect::<Result<_>>()?;
+    let arguments: Vec<(&str, &Buffer)> = parameters.iter().map(|p| p.name.as_str()).zip(&buffers).collect();
+    device.run(variant, &arguments, 1)?;
     // A note beside what PoCL keeps; without it the variant is compiled again, which finds it there.
     if let Some(note) = note(device, variant) {
         drop(note.parent().map(std::fs::create_dir_all));

@@ -103,11 +103,7 @@ fn source() -> Source {
                 + &FieldPass::opencl_text()
                 + &PhotonTransport::opencl_text()
         },
-        arguments: 5,
-        volume: None,
-        variants: || {
-            plan::FEATURES.iter().map(|f| Variant { kernel: TECHNIQUE.name, voxel: None, features: f }).collect()
-        },
+        variants: || plan::FEATURES.iter().map(|f| Variant::new(TECHNIQUE.name, None, f)).collect(),
         common: 2,
     }
 }

@@ -185,15 +185,13 @@ static FEATURES: [Features; 8] = {
 };
 
 fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
-    Variant { kernel: TECHNIQUE.name, voxel: Some(voxel), features }
+    Variant::new(TECHNIQUE.name, Some(voxel), features)
 }
 
 fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
         structs: || DeviceView::opencl_text() + &Projection::opencl_text(),
-        arguments: 7,
-        volume: Some(2),
         variants: || FEATURES.iter().flat_map(|f| VoxelType::ALL.map(|t| variant(t, f))).collect(),
         common: 2 * VoxelType::ALL.len(),
     }

@@ -137,12 +137,10 @@ fn a_warning_fails_the_build_and_names_the_level() {
     let source = Source {
         kernel: "cells",
         structs: || "kernel void sloppy(global int *out) { if (out = out) *out = 1; }\n".into(),
-        arguments: 1,
-        volume: None,
         variants: Vec::new,
         common: 0,
     };
-    let variant = Variant { kernel: "cells", voxel: Some(VoxelType::U8), features: &[] };
+    let variant = Variant::new("cells", Some(VoxelType::U8), &[]);
     for level in &LEVELS {
         let said = compile(compiler(), level, &source, &variant).expect_err("an assignment for a comparison");
         assert!(said.starts_with(level.name) && said.contains("-Werror"), "{said}");

@@ -217,7 +217,7 @@ impl Simulation {
             bins = 2 * device.radius_bins as usize * device.angle_bins as usize;
         }
         FieldPlan {
-            variant: Variant { kernel: TECHNIQUE.name, voxel: None, features: features(g, self.tracking) },
+            variant: Variant::new(TECHNIQUE.name, None, features(g, self.tracking)),
             parameters: bytemuck::bytes_of(&device).to_vec(),
             table,
             cells: g.dims.iter().product(),

@@ -52,8 +52,6 @@ pub(in crate::technique) fn source(kernel: &'static str) -> Source {
                 + &DeviceView::opencl_text()
                 + &Scattering::opencl_text()
         },
-        arguments: 8,
-        volume: Some(2),
         variants: match kernel {
             "single_scatter" => || variants("single_scatter"),
             _ => || variants("volume_path"),
@@ -69,7 +67,7 @@ const SCATTERINGS_MISSING: f64 = 0.01;
 fn variants(kernel: &'static str) -> Vec<Variant> {
     let mut types = VoxelType::ALL;
     types.reverse();
-    let of = |features: &'static Features| types.map(|t| Variant { kernel, voxel: Some(t), features });
+    let of = |features: &'static Features| types.map(|t| Variant::new(kernel, Some(t), features));
     FEATURES.iter().flat_map(of).collect()
 }
 
@@ -201,7 +199,7 @@ impl View for Scatterer {
     fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
         self.check_march(volume)?;
         let (features, why) = self.features(volume);
-        let variant = Variant { kernel: self.kernel, voxel: Some(volume.voxel_type()), features };
+        let variant = Variant::new(self.kernel, Some(volume.voxel_type()), features);
         let sigma = self.parameters.medium.sigma_t_per_unit(volume);
         Ok(ViewPlan {
             variant,
