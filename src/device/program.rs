@@ -3,11 +3,27 @@
 use std::path::Path;
 
 use super::include::{assemble, read};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::volume::VoxelType;
 
 /// The `-D NAME=VALUE` options of a variant.
 pub type Features = &'static [(&'static str, i32)];
+
+fn words(features: &[(&str, i32)]) -> String {
+    features.iter().map(|(name, value)| format!(" {name}={value}")).collect()
+}
+
+/// The features of `list` that are `wanted`, for a variant of `kernel`.
+///
+/// # Errors
+/// [`Error::Internal`] naming the features when they are not listed: no kernel was tested with them.
+pub fn listed<F>(kernel: &str, list: &'static [F], wanted: F) -> Result<&'static F>
+where
+    F: AsRef<[(&'static str, i32)]> + PartialEq,
+{
+    let missing = || Error::internal(format!("{kernel}{} is no listed variant", words(wanted.as_ref())));
+    list.iter().find(|features| **features == wanted).ok_or_else(missing)
+}
 
 /// One permitted build of one kernel function.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -39,7 +55,7 @@ impl Source {
     /// The whole text in one string: the structs, then the kernel file with all that it includes.
     ///
     /// # Errors
-    /// [`Error::Internal`](crate::error::Error::Internal) when a file is missing, or files include each other in a circle.
+    /// [`Error::Internal`] when a file is missing, or files include each other in a circle.
     pub fn text(&self, overrides: Option<&Path>) -> Result<String> {
         let kernel = assemble(&format!("{}.cl", self.kernel), &|name| read(overrides, name))?;
         Ok(format!("#line 1 \"structs\"\n{}{kernel}", (self.structs)()))
@@ -88,8 +104,7 @@ impl Variant {
     /// A name for logs, such as `emission_absorption u8 SHADED=1`; a function of another name than its file follows that and a dot.
     pub fn label(&self) -> String {
         let voxel = self.voxel.map(|v| format!(" {v:?}").to_lowercase()).unwrap_or_default();
-        let features: String = self.features.iter().map(|(n, v)| format!(" {n}={v}")).collect();
         let function = if self.function == self.kernel { String::new() } else { format!(".{}", self.function) };
-        format!("{}{function}{voxel}{features}", self.kernel)
+        format!("{}{function}{voxel}{}", self.kernel, words(self.features))
     }
 }

@@ -199,7 +199,7 @@ impl Field for Simulation {
     }
 
     fn plan(&self) -> Result<FieldPlan> {
-        Ok(self.device_plan())
+        self.device_plan()
     }
 
     fn finish(&self, grid: &[u64], ledgers: &[Vec<u64>], histories: u64) -> Result<FieldResult> {

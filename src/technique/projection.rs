@@ -40,7 +40,7 @@ use serde_json::{Value, json};
 
 use super::steps::coarse_step;
 use super::{CellUse, Kind, Technique, View, ViewPlan};
-use crate::device::program::{Source, Variant};
+use crate::device::program::{Source, Variant, listed};
 use crate::device::structs::{DeviceStruct, View as DeviceView};
 use crate::device_struct;
 use crate::error::{Error, Result};
@@ -184,6 +184,10 @@ static FEATURES: [Features; 8] = {
     ]
 };
 
+fn permitted(wanted: Features) -> Result<&'static Features> {
+    listed(TECHNIQUE.name, &FEATURES, wanted)
+}
+
 fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
     Variant::new(TECHNIQUE.name, Some(voxel), features)
 }
@@ -267,7 +271,7 @@ impl View for Parameters {
 
     fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
         let wanted = features(self.interpolation(), self.walked());
-        let features = FEATURES.iter().find(|f| **f == wanted).unwrap_or(&FEATURES[0]);
+        let features = permitted(wanted)?;
         let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
         let mut reasons = vec![format!("window: {}", self.window(volume)?)];
         reasons.push(match (self.walked(), self.empty_space_skipping) {
@@ -318,5 +322,17 @@ impl View for Parameters {
 
     fn look(&self, _camera: &Camera, view: &mut DeviceView) {
         view.jittered = 0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn features_that_are_not_listed_are_an_error_that_names_them() {
+        assert!(permitted(features(Interpolation::BSpline, true)).is_ok());
+        let said = permitted([("INTERPOLATION", 7), ("WALKED", 0)]).expect_err("not listed").to_string();
+        assert!(said.contains("projection INTERPOLATION=7 WALKED=0"), "{said}");
     }
 }

@@ -32,7 +32,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::{CellUse, Kind, Technique, View, ViewPlan};
-use crate::device::program::{Source, Variant};
+use crate::device::program::{Source, Variant, listed};
 use crate::device::structs::{DeviceStruct, View as DeviceView};
 use crate::device_struct;
 use crate::error::{Error, Result};
@@ -166,6 +166,10 @@ static FEATURES: [Features; 4] = {
     ]
 };
 
+fn permitted(wanted: Features) -> Result<&'static Features> {
+    listed(TECHNIQUE.name, &FEATURES, wanted)
+}
+
 fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
     Variant::new(TECHNIQUE.name, Some(voxel), features)
 }
@@ -242,7 +246,7 @@ impl Parameters {
 impl View for Parameters {
     fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
         let wanted = [("INTERPOLATION", self.interpolation.unwrap_or(Interpolation::Trilinear).code())];
-        let features = FEATURES.iter().find(|f| **f == wanted).unwrap_or(&FEATURES[0]);
+        let features = permitted(wanted)?;
         let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
         Ok(ViewPlan {
             variant: variant(volume.voxel_type(), features),
@@ -282,5 +286,17 @@ impl View for Parameters {
 
     fn look(&self, _camera: &Camera, view: &mut DeviceView) {
         view.jittered = 0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn features_that_are_not_listed_are_an_error_that_names_them() {
+        assert!(permitted([("INTERPOLATION", Interpolation::BSpline.code())]).is_ok());
+        let said = permitted([("INTERPOLATION", 7)]).expect_err("not listed").to_string();
+        assert!(said.contains("slice INTERPOLATION=7"), "{said}");
     }
 }

@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use super::pieces::pieces;
 use super::{EmissionAbsorption, Parameters, TECHNIQUE, regions};
-use crate::device::program::{Source, Variant};
+use crate::device::program::{Source, Variant, listed};
 use crate::device::structs::{DeviceStruct, View as DeviceView};
 use crate::error::Result;
 use crate::scene::camera::Camera;
@@ -58,6 +58,12 @@ static FEATURES: [Features; 16] = {
     ]
 };
 const COMMON: usize = 2;
+
+/// `check_together` lets nothing through that is not listed.
+fn permitted(wanted: Features) -> Result<&'static Features> {
+    listed(TECHNIQUE.name, &FEATURES, wanted)
+}
+
 fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
     Variant::new(TECHNIQUE.name, Some(voxel), features)
 }
@@ -89,15 +95,14 @@ impl Parameters {
         TransferFunction::from_request(&request, volume, "/emission_absorption/transfer_function")
     }
 
-    fn features(&self) -> &'static Features {
+    fn features(&self) -> Result<&'static Features> {
         let wanted = if self.styled() {
             styled(self.interpolation())
         } else {
             let reversed = self.order == "back_to_front";
             features(self.interpolation(), self.shading, reversed, false, self.pre_integrated)
         };
-        // `check_together` lets nothing else through.
-        FEATURES.iter().find(|f| **f == wanted).unwrap_or(&FEATURES[0])
+        permitted(wanted)
     }
 
     fn threshold(&self) -> f64 {
@@ -123,7 +128,7 @@ impl View for Parameters {
     /// Half an entry of the table. The plain reference form, and what is of another order or style, take values as they are.
     fn resolution(&self, volume: &Volume) -> Result<Option<f64>> {
         let plain = [plain(Interpolation::Trilinear, false), plain(Interpolation::Trilinear, true)];
-        if !plain.contains(self.features()) {
+        if !plain.contains(self.features()?) {
             return Ok(None);
         }
         let [low, high] = self.transfer_function(volume)?.0.domain();
@@ -145,7 +150,7 @@ impl View for Parameters {
         }
         let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
         Ok(ViewPlan {
-            variant: variant(volume.voxels().voxel_type(), self.features()),
+            variant: variant(volume.voxels().voxel_type(), self.features()?),
             cells: if skip { CellUse::Distances(opaque) } else { CellUse::None },
             step: (self.step_voxels * smallest) as f32,
             stepless: false,
@@ -197,5 +202,21 @@ impl View for Parameters {
             (view.jittered, view.place) = (0, 0.5);
         }
         self.light.clone().unwrap_or_default().apply(camera, view);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn features_that_are_not_listed_are_an_error_that_names_them() {
+        assert!(permitted(styled(Interpolation::BSpline)).is_ok());
+        let said =
+            permitted(features(Interpolation::BSpline, false, true, true, true)).expect_err("not listed").to_string();
+        assert!(
+            said.contains("emission_absorption INTERPOLATION=2 SHADED=0 BACK_TO_FRONT=1 STYLED=1 PREINTEGRATED=1"),
+            "{said}"
+        );
     }
 }

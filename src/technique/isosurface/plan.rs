@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::surfaces::{self, Surface};
 use super::{Isosurface, Normals, Output, Parameters, Sampling, TECHNIQUE};
-use crate::device::program::{Source, Variant};
+use crate::device::program::{Source, Variant, listed};
 use crate::device::structs::{DeviceStruct, View as DeviceView};
 use crate::error::Result;
 use crate::scene;
@@ -41,6 +41,10 @@ static FEATURES: [Features; 7] = {
         features(CatmullRom, true),
     ]
 };
+
+fn permitted(wanted: Features) -> Result<&'static Features> {
+    listed(TECHNIQUE.name, &FEATURES, wanted)
+}
 
 fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
     Variant::new(TECHNIQUE.name, Some(voxel), features)
@@ -91,7 +95,7 @@ impl View for Parameters {
     fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
         let surfaces = self.surfaces(volume);
         let wanted = features(self.interpolation(), self.layered(&surfaces));
-        let features = FEATURES.iter().find(|f| **f == wanted).unwrap_or(&FEATURES[0]);
+        let features = permitted(wanted)?;
         let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
         let values: Vec<String> = surfaces.iter().map(|s| format!("{:.4}", s.isovalue)).collect();
         let mut reasons = vec![format!("isovalues: {}", values.join(", "))];
@@ -150,5 +154,17 @@ impl View for Parameters {
             json!({"code": "isovalue_outside_range", "message": message, "measured": s.isovalue, "bound": [low, high]})
         };
         self.surfaces(volume).iter().filter(outside).map(warning).chain(coarse_step(self.step_voxels)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn features_that_are_not_listed_are_an_error_that_names_them() {
+        assert!(permitted(features(Interpolation::BSpline, true)).is_ok());
+        let said = permitted(features(Interpolation::Nearest, true)).expect_err("not listed").to_string();
+        assert!(said.contains("isosurface INTERPOLATION=0 LAYERED=1"), "{said}");
     }
 }

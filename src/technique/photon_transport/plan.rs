@@ -7,7 +7,8 @@ use super::geometry::{Geometry, Where};
 use super::parameters::Parameters;
 use super::tracking::{Tracking, majorants};
 use super::{LEDGER_BINS, PhotonTransport, Simulation, TECHNIQUE, medium};
-use crate::device::program::Variant;
+use crate::device::program::{Variant, listed};
+use crate::error::Result;
 use crate::technique::FieldPlan;
 
 /// Light in a vacuum, mm per ns.
@@ -49,15 +50,18 @@ pub(super) static FEATURES: [Features; 20] = {
     ]
 };
 
-fn features(geometry: &Geometry, tracking: Tracking) -> &'static Features {
+fn permitted(wanted: Features) -> Result<&'static Features> {
+    listed(TECHNIQUE.name, &FEATURES, wanted)
+}
+
+fn features(geometry: &Geometry, tracking: Tracking) -> Result<&'static Features> {
     let place = match geometry.place {
         Where::Box => 0,
         Where::Layers(_) => 1,
         Where::Labels { .. } => 2,
         Where::Density(_) => 3,
     };
-    let wanted = [("GEOMETRY", place), ("TRACKING", tracking as i32), ("GAMMA", geometry.is_gamma().into())];
-    FEATURES.iter().find(|f| **f == wanted).unwrap_or(&FEATURES[0])
+    permitted([("GEOMETRY", place), ("TRACKING", tracking as i32), ("GAMMA", geometry.is_gamma().into())])
 }
 
 /// Appends to the table and says where.
@@ -146,7 +150,7 @@ impl Simulation {
         }
     }
 
-    pub(super) fn device_plan(&self) -> FieldPlan {
+    pub(super) fn device_plan(&self) -> Result<FieldPlan> {
         let (p, g) = (&self.parameters, &self.geometry);
         let mut table = medium::table(&g.media);
         let spacing = self.spacing_mm();
@@ -216,15 +220,15 @@ impl Simulation {
             device.at_cosines = append(&mut table, histogram.angle_edges_deg.iter().map(cosine));
             bins = 2 * device.radius_bins as usize * device.angle_bins as usize;
         }
-        FieldPlan {
-            variant: Variant::new(TECHNIQUE.name, None, features(g, self.tracking)),
+        Ok(FieldPlan {
+            variant: Variant::new(TECHNIQUE.name, None, features(g, self.tracking)?),
             parameters: bytemuck::bytes_of(&device).to_vec(),
             table,
             cells: g.dims.iter().product(),
             ledger: LEDGER_BINS + bins,
             histories: p.photons,
             reasons: self.reasons.clone(),
-        }
+        })
     }
 
     /// In a thin box only light that total reflection keeps in takes many steps: without absorption it would never end.
@@ -253,5 +257,17 @@ impl Parameters {
     /// The request's grid, or another.
     pub(super) fn dims(&self, otherwise: [usize; 3]) -> [usize; 3] {
         self.grid.map_or(otherwise, |g| g.map(|n| n as usize))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn features_that_are_not_listed_are_an_error_that_names_them() {
+        assert!(permitted([("GEOMETRY", 3), ("TRACKING", 0), ("GAMMA", 1)]).is_ok());
+        let said = permitted([("GEOMETRY", 3), ("TRACKING", 2), ("GAMMA", 1)]).expect_err("not listed").to_string();
+        assert!(said.contains("photon_transport GEOMETRY=3 TRACKING=2 GAMMA=1"), "{said}");
     }
 }

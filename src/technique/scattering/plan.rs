@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::device::Scattering;
 use super::parameters::{Parameters, Tracking};
 use crate::device::cells::CELL;
-use crate::device::program::{Source, Variant};
+use crate::device::program::{Source, Variant, listed};
 use crate::device::structs::{DeviceStruct, View as DeviceView};
 use crate::error::{Error, Result};
 use crate::scene;
@@ -120,7 +120,7 @@ impl Scatterer {
         (0..if grey { 1 } else { 3 }).map(of).fold(0.0, f64::max)
     }
 
-    fn features(&self, volume: &Volume) -> (&'static Features, String) {
+    fn features(&self, volume: &Volume) -> Result<(&'static Features, String)> {
         let (p, interpolation) = (&self.parameters, self.parameters.interpolation());
         let any = matches!(p.tracking, Tracking::Auto | Tracking::Exact);
         let (wanted, why) = match p.tracking {
@@ -133,7 +133,7 @@ impl Scatterer {
             Tracking::Delta => (of(1, 2, interpolation), "delta, as asked"),
             Tracking::Weighted => (of(1, 3, interpolation), "weighted, as asked"),
         };
-        (FEATURES.iter().find(|f| **f == wanted).unwrap_or(&FEATURES[0]), format!("tracking {why}"))
+        Ok((listed(self.kernel, &FEATURES, wanted)?, format!("tracking {why}")))
     }
 
     /// A march whose step is lost in the rounding of places along some axis would never end.
@@ -198,7 +198,7 @@ impl Scatterer {
 impl View for Scatterer {
     fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
         self.check_march(volume)?;
-        let (features, why) = self.features(volume);
+        let (features, why) = self.features(volume)?;
         let variant = Variant::new(self.kernel, Some(volume.voxel_type()), features);
         let sigma = self.parameters.medium.sigma_t_per_unit(volume);
         Ok(ViewPlan {
@@ -213,7 +213,7 @@ impl View for Scatterer {
 
     fn parameters(&self, volume: &Volume, _camera: &Camera) -> Result<Vec<u8>> {
         let (p, m) = (&self.parameters, &self.parameters.medium);
-        let (features, _) = self.features(volume);
+        let (features, _) = self.features(volume)?;
         let sigma = m.sigma_t_per_unit(volume);
         let most = sigma.into_iter().fold(0.0, f64::max);
         let [scale, offset, density_most] = m.density();
@@ -297,5 +297,18 @@ impl View for Scatterer {
             warn("multiple_scattering_missing", message, missing, SCATTERINGS_MISSING);
         }
         warnings
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn features_that_are_not_listed_are_an_error_that_names_them() {
+        assert!(listed("volume_path", &FEATURES, of(1, 1, Interpolation::Nearest)).is_ok());
+        let said =
+            listed("volume_path", &FEATURES, of(0, 1, Interpolation::Nearest)).expect_err("not listed").to_string();
+        assert!(said.contains("volume_path GEOMETRY=0 TRACKING=1 INTERPOLATION=0"), "{said}");
     }
 }
