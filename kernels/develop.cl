@@ -1,7 +1,7 @@
 // The film developed where it is: the picture in sRGB bytes, and sums that its error is made of. What is large stays on the device.
 //
 // Items, in order: blocks of two rows of the film; rows of the control; where the film has fewer pixels than the picture (WHOLE 0), rows
-// of the picture, which is interpolated. Each of the first two leaves SUMS numbers of its own, which the host adds up in double precision.
+// of the picture, which is interpolated. Each of the first two leaves SUM_LENGTH numbers of its own, which the host adds up in double precision.
 // Squares are added up as parts of the greatest square so far, so that none is lost below the least float.
 
 #include "shared/lanes.h"
@@ -9,10 +9,6 @@
 
 // Pixels of a row that a work-item takes; a whole number of packets and of tiles.
 #define ACROSS (LANES == 1 ? 32 : 8 * LANES)
-#define SUMS 12
-enum { LUMINANCE, LUMINANCE_SCALE, TRUNCATED, BLOCKS, BETWEEN, PIXELS_BETWEEN, NOISE_SCALE, NOISE, NOISE_SQUARES, UNKNOWN, CLIPPED, WEIGHTED };
-// Of a row of the control.
-enum { DIFFERENCE_SCALE, DIFFERENCE, VARIANCE };
 
 // Makes `scale` the greatest yet; what the squares that are parts of the square of the one before are to be multiplied by.
 static inline float rescale(float *scale, Real values) {
@@ -141,18 +137,18 @@ static inline void of_film(constant Develop *d, global const float *film, global
 #endif
         for (int row = 0; row < rows; row++) between += of_between(light[row], one, x, inside, before[row], &pixels);
     }
-    sums[LUMINANCE] = sum_lanes(luminance);
-    sums[LUMINANCE_SCALE] = scale;
-    sums[TRUNCATED] = sum_lanes(truncated);
-    sums[BLOCKS] = blocks;
-    sums[BETWEEN] = between;
-    sums[PIXELS_BETWEEN] = pixels;
-    sums[NOISE_SCALE] = noise_scale;
-    sums[NOISE] = sum_lanes(noise);
-    sums[NOISE_SQUARES] = sum_lanes(squares);
-    sums[UNKNOWN] = (float)unknown;
-    sums[CLIPPED] = (float)clipped;
-    sums[WEIGHTED] = sum_lanes(weighted);
+    sums[SUM_LUMINANCE] = sum_lanes(luminance);
+    sums[SUM_LUMINANCE_SCALE] = scale;
+    sums[SUM_TRUNCATED] = sum_lanes(truncated);
+    sums[SUM_BLOCKS] = blocks;
+    sums[SUM_BETWEEN] = between;
+    sums[SUM_PIXELS_BETWEEN] = pixels;
+    sums[SUM_NOISE_SCALE] = noise_scale;
+    sums[SUM_NOISE] = sum_lanes(noise);
+    sums[SUM_NOISE_SQUARES] = sum_lanes(squares);
+    sums[SUM_UNKNOWN] = (float)unknown;
+    sums[SUM_CLIPPED] = (float)clipped;
+    sums[SUM_WEIGHTED] = sum_lanes(weighted);
 }
 
 // A row of the control against the film's pixels at the same places.
@@ -182,9 +178,9 @@ static inline void of_control(constant Develop *d, global const float *film, glo
         }
         variance += select((Real)(0.0f), variances(gather_reals(deviations, at), samples), lanes);
     }
-    sums[DIFFERENCE_SCALE] = scale;
-    sums[DIFFERENCE] = sum_lanes(difference);
-    sums[VARIANCE] = sum_lanes(variance);
+    sums[CONTROL_DIFFERENCE_SCALE] = scale;
+    sums[CONTROL_DIFFERENCE] = sum_lanes(difference);
+    sums[CONTROL_VARIANCE] = sum_lanes(variance);
 }
 
 #if !WHOLE
@@ -233,10 +229,10 @@ kernel void develop(constant Develop *settings, global const float *film, global
     int item = (int)get_global_id(0);
     int blocks = (settings->width + ACROSS - 1) / ACROSS * ((settings->height + 1) / 2);
     if (item < blocks) {
-        of_film(settings, film, counts, curve, picture, item, sums + SUMS * item);
+        of_film(settings, film, counts, curve, picture, item, sums + SUM_LENGTH * item);
         return;
     }
-    global float *own = sums + SUMS * item;
+    global float *own = sums + SUM_LENGTH * item;
     item -= blocks;
     if (item < settings->control_height) {
         of_control(settings, film, control, counts, item, own);

@@ -1,18 +1,18 @@
-// The instruction set that this is compiled for, as a number of `LEVELS` in src/device/level.rs.
+// The instruction set that this is compiled for, as a number of src/device/level.rs.
 #if defined(__AVX512F__) && defined(__AVX512BW__) && defined(__AVX512DQ__) && defined(__AVX512VL__)
-#define LEVEL 6
+#define LEVEL LEVEL_AVX512
 #elif defined(__AVX2__)
-#define LEVEL 5
+#define LEVEL LEVEL_AVX2
 #elif defined(__AVX__)
-#define LEVEL 4
+#define LEVEL LEVEL_AVX
 #elif defined(__SSE4_2__)
-#define LEVEL 3
+#define LEVEL LEVEL_SSE42
 #elif defined(__SSE4_1__)
-#define LEVEL 2
+#define LEVEL LEVEL_SSE41
 #elif defined(__ARM_NEON)
-#define LEVEL 1
+#define LEVEL LEVEL_NEON
 #else
-#define LEVEL 0
+#define LEVEL LEVEL_GENERIC
 #endif
 
 kernel void level(global int *out) {

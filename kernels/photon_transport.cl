@@ -174,13 +174,13 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
         Real rate = collision_rate(params, table, medium, photon.cell, photon.p);
 #if GAMMA
         rate = attenuation_at(params, table, medium, photon.energy).extinction;
-#if GEOMETRY == DENSITY
+#if MEDIA == MEDIA_DENSITY
         rate *= gather_reals(table + params->at_voxels, cell_voxel(params, photon.cell));
 #endif
 #endif
         Ahead ahead = look_ahead(params, table, &photon);
         Real t_wall = ahead.nearest;
-#if TRACKING == MARCH
+#if TRACKING == TRACKING_MARCH
         // The lecture's march: a free path is as many whole steps as it takes to use up its optical depth.
         Real t = fmin(t_wall, (Real)(params->march_step_mm));
         Mask at_wall = MASK(t_wall <= params->march_step_mm), hit = alive & ~at_wall & MASK(photon.depth <= rate * t) & MASK(rate > 0.0f);
@@ -201,7 +201,7 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
         if (params->tally == TALLY_FLUENCE_TRACK || params->tally == TALLY_ABSORBED_TRACK) {
 #if VOXEL_WALLS
             Real amount = photon.weight * t * params->deposit_scale;
-            if (params->tally == TALLY_ABSORBED_TRACK) amount *= rate * (1.0f - medium_number(params, table, medium, 1));
+            if (params->tally == TALLY_ABSORBED_TRACK) amount *= rate * (1.0f - medium_number(params, table, medium, MEDIUM_ALBEDO));
             grid_add(&sums, cell_voxel(params, photon.cell), fixed(amount), alive);
 #else
             deposit_track(params, table, &sums, photon.p, photon.d, t, photon.weight, alive);
@@ -216,7 +216,7 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
         if (any_lane(late)) gain(&gains.sums[LEDGER_GATED], photon.weight, late);
         Mask goes_on = hit;
         if (any_lane(hit)) {
-#if TRACKING == MARCH || BLOCK_WALLS
+#if TRACKING == TRACKING_MARCH || BLOCK_WALLS
             // The medium is that of the place which the photon has come to.
             medium = medium_of(params, table, photon.cell, photon.p);
 #endif

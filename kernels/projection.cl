@@ -10,11 +10,6 @@
 #include "shared/walk.h"
 #include "shared/window.h"
 
-#define MODE_PEAK 0
-#define MODE_MEAN 1
-#define MODE_SUM 2
-#define MODE_XRAY 3
-
 static inline void show(constant const View *view, constant const Projection *params, global const uchar *table, global float *film,
                         global uint *counts, const Packet *p, Real value, Mask shown) {
     film_value(view, film, counts, p, table, params->window_scale, params->window_offset, params->raw_values, value, shown);
@@ -23,16 +18,16 @@ static inline void show(constant const View *view, constant const Projection *pa
 #if WALKED
 static inline void project(constant const View *view, constant const Projection *params, VOLUME voxels, global const uchar *table,
                            global float *film, global uint *counts, const Packet *p) {
-    int peaks = params->mode == MODE_PEAK;
+    int peaks = params->mode == PROJECTION_PEAK;
     Walk w = walk(view, voxels, params->sign, peaks, p->ray.origin, p->ray.direction, p->ray.t_near, p->ray.t_far);
     Real value, integral = mad(w.integral, (Real)(params->slope), w.length * params->inter);
     Mask shown = MASK(w.length > 0.0f);
     if (peaks) {
         shown = MASK(w.best > -INFINITY);
         value = mad(params->sign * w.best, (Real)(params->slope), (Real)(params->inter));
-    } else if (params->mode == MODE_MEAN) {
+    } else if (params->mode == PROJECTION_MEAN) {
         value = integral / select((Real)(1.0f), w.length, shown);
-    } else if (params->mode == MODE_SUM) {
+    } else if (params->mode == PROJECTION_SUM) {
         value = integral;
     } else {
         // sigma = sigma_per_value (value - zero_value), so its integral needs no walk of its own.
@@ -50,7 +45,7 @@ static inline void project(constant const View *view, constant const Projection 
 // No sample of the beam in the steps first..last has a greater sign * raw value.
 static inline float part_bound(constant const View *view, constant const Projection *params, global const uchar *ranges, const Beam *b, int first,
                                int last) {
-#if INTERPOLATION == CATMULL_ROM
+#if INTERPOLATION == INTERPOLATION_CATMULL_ROM
     return INFINITY; // overshoots what the cells say
 #else
     // A B-spline reads a voxel further than the cells do.

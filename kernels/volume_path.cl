@@ -106,7 +106,7 @@ static inline Mask scatter(constant const View *view, constant const Scattering 
         Real own = l.chance * ray.density, share = select((Real)(1.0f), own / (own + density), MASK(own > 0.0f));
         Real3 light = scale3(times3(leaves, ray.light), density * share / l.chance);
         aims = goes_on & MASK(magnitude(light) > 0.0f);
-#if GEOMETRY == BOX
+#if DENSITY == DENSITY_CONSTANT
         // In closed form without a flight.
         add_light(&path->light, times3(light, box_transmittance(view, params, f->p, ray.d, ray.length)), aims);
         aims = (Mask)(0);

@@ -8,6 +8,8 @@ mod cells;
 mod common;
 #[path = "device/develop.rs"]
 mod develop;
+#[path = "device/names.rs"]
+mod names;
 
 use std::path::Path;
 use std::process::Command;

@@ -7,7 +7,7 @@
 #include "shared/lanes.h"
 #include "shared/volume.h"
 
-#if INTERPOLATION == TRILINEAR && !VOLUMES_ARE_IMAGES
+#if INTERPOLATION == INTERPOLATION_TRILINEAR && !VOLUMES_ARE_IMAGES
 #if WEIGHTS_ARE_WORDS && (VOXEL == VOXEL_U8 || LANES == 16)
 #define NARROW 1.98f
 #elif VOXEL == VOXEL_F32 && LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_vpermi2varps512)

@@ -25,7 +25,7 @@ static inline Bracket select_bracket(Bracket no, Bracket yes, Mask m) {
 
 // Whether the isovalue is passed. With `nearest`, as in the lecture: whether the far end is in what is to be seen.
 static inline Mask crossed(constant const Isosurface *params, const Bracket *b) {
-#if INTERPOLATION == NEAREST
+#if INTERPOLATION == INTERPOLATION_NEAREST
     return MASK(params->sign * b->f1 >= 0.0f);
 #elif VOXEL == VOXEL_F32
     return (MASK(b->f0 < 0.0f) & MASK(b->f1 >= 0.0f)) | (MASK(b->f0 >= 0.0f) & MASK(b->f1 < 0.0f)); // never for NaN
@@ -41,7 +41,7 @@ static inline Mask crossed(constant const Isosurface *params, const Bracket *b) 
 // The crossing in the bracket by regula falsi in the Illinois form, which halves the value of an end that stays (Dowell & Jarratt,
 // BIT 11, 1971), until the bracket is `tolerance` wide, and once more linearly within it.
 static inline Real refined(constant const View *view, constant const Isosurface *params, VOLUME voxels, const Packet *p, Bracket b, Mask on) {
-#if INTERPOLATION == NEAREST
+#if INTERPOLATION == INTERPOLATION_NEAREST
     return b.t1;
 #else
     for (int i = 0; i < REFINEMENTS; i++) {
@@ -64,14 +64,14 @@ static inline Real refined(constant const View *view, constant const Isosurface 
 
 // The gradient of the raw value in index units: by central differences, or of the interpolant itself.
 static inline Real3 surface_gradient(constant const View *view, VOLUME voxels, int analytic, Real3 at, Mask on) {
-#if INTERPOLATION != NEAREST
+#if INTERPOLATION != INTERPOLATION_NEAREST
     if (analytic) {
         Real3 g;
         taps_raw(view, voxels, at, &g);
         return g;
     }
 #endif
-#if INTERPOLATION == TRILINEAR
+#if INTERPOLATION == INTERPOLATION_TRILINEAR
     float nx = (float)view->dims[0] - INNER_MARGIN, ny = (float)view->dims[1] - INNER_MARGIN, nz = (float)view->dims[2] - INNER_MARGIN;
     Mask inner = MASK(at.x > INNER_MARGIN) & MASK(at.x < nx) & MASK(at.y > INNER_MARGIN) & MASK(at.y < ny) & MASK(at.z > INNER_MARGIN) & MASK(at.z < nz);
     if (!any_lane(on & ~inner)) {

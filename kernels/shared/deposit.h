@@ -74,7 +74,7 @@ static inline void deposit_track(constant const PhotonTransport *params, global 
             if (params->tally == TALLY_ABSORBED_TRACK) {
                 Cell c = cell_at(params, table, middle);
                 Int medium = medium_of(params, table, c, middle);
-                amount *= extinction_at(params, table, medium, c, middle) * (1.0f - medium_number(params, table, medium, 1));
+                amount *= extinction_at(params, table, medium, c, middle) * (1.0f - medium_number(params, table, medium, MEDIUM_ALBEDO));
             }
             grid_add(grid, voxel, fixed(amount), inside);
         }

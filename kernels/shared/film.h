@@ -7,8 +7,6 @@
 
 #include "shared/lanes.h"
 
-#define COUNT_NON_FINITE 0
-
 static inline float luminance(float4 c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
 
 static inline void film_add(global float *film, global uint *counts, int pixel, int pixels, int sample, float4 colour) {

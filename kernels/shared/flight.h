@@ -1,7 +1,7 @@
 // Flights of light through a volume whose values are densities: extinction = density * sigma_t. Places are in index units, lengths in
 // world units. A free flight ends at a real collision; a ratio flight estimates the transmittance to its end (ratio tracking,
 // Novak, Selle, Jarosz, SIGGRAPH Asia 2014: T = prod (1 - sigma / m) over tentative collisions; in closed form where the extinction
-// is constant from wall to wall). GEOMETRY is BOX, where the density is the same everywhere, or GRID.
+// is constant from wall to wall). DENSITY is CONSTANT, where it is the same everywhere, or GRID.
 // Extinctions of three colours are tracked together by that of the greatest: a collision is real with the probability
 // P = sum(w sigma) / (m sum(w)) of the light w that is left, and the colours are weighed by sigma / (m P) or (m - sigma) / (m (1 - P))
 // (Kutz, Habel, Li, Novak, "Spectral and Decomposition Tracking", SIGGRAPH 2017).
@@ -16,14 +16,6 @@
 #include "shared/volume.h"
 #include "shared/walls.h"
 
-#define BOX 0
-#define GRID 1
-
-#define COUNT_FIREFLIES 1
-#define COUNT_CLAMPED 2
-#define COUNT_BROKEN 3
-#define COUNT_CLAMPED_ENERGY 4 // two words, in units of 2^-16 of clamp_luminance
-#define COUNT_CUT 6
 // A path of more collisions than this is cut and counted.
 #define MOST_EVENTS 1000000u
 
@@ -135,7 +127,7 @@ static inline Sight look(constant const View *view, constant const Scattering *p
     return s;
 }
 
-#if GEOMETRY == BOX
+#if DENSITY == DENSITY_CONSTANT
 // What of each colour gets from p in the box along d, as far as `length` or the box's faces.
 static inline Real3 box_transmittance(constant const View *view, constant const Scattering *params, Real3 p, Real3 d, Real length) {
     Real3 way = way_of(view, d);
@@ -160,7 +152,7 @@ static inline Real density_of(constant const Scattering *params, Real raw) {
 }
 
 static inline Real density_at(constant const View *view, constant const Scattering *params, VOLUME voxels, Real3 p) {
-#if GEOMETRY == BOX
+#if DENSITY == DENSITY_CONSTANT
     return (Real)(params->density_box);
 #else
     return density_of(params, sample_raw(view, voxels, p));
@@ -174,11 +166,11 @@ static inline Real range_end(global const uchar *ranges, Int cell, int greatest)
 
 // How often a free path ends in the cell, per length: the greatest colour's extinction, or a majorant of it.
 static inline Real rate_at(constant const View *view, constant const Scattering *params, VOLUME voxels, global const uchar *ranges, const Flight *f) {
-#if GEOMETRY == BOX
+#if DENSITY == DENSITY_CONSTANT
     return (Real)(params->majorant);
-#elif TRACKING == EXACT
+#elif TRACKING == TRACKING_EXACT
     return density_of(params, voxel_raw(view, voxels, f->cell.x, f->cell.y, f->cell.z)) * params->sigma_most;
-#elif TRACKING == MARCH
+#elif TRACKING == TRACKING_MARCH
     return density_at(view, params, voxels, f->p) * params->sigma_most;
 #else
     if (params->whole) return (Real)(params->majorant);
@@ -210,7 +202,7 @@ static inline Mask tell_colours(constant const Scattering *params, Real sigma, R
 // Which of the collisions by `rate` are real, where the extinction is `sigma`.
 static inline Mask tell_collisions(constant const Scattering *params, Real sigma, Real rate, Real u, Mask hit, Flight *f) {
     if (params->chromatic) return tell_colours(params, sigma, rate, u, hit, f);
-#if TRACKING < DELTA
+#if !BY_MAJORANTS
     return hit;
 #else
     Real factor;
@@ -234,21 +226,21 @@ static inline Mask fly(constant const View *view, constant const Scattering *par
     #undef REACH
     Real t_yz = LESSER(ty, tz), t_wall = LESSER(tx, t_yz), room = LESSER(t_wall, f->left);
     Mask ends = alive & MASK(f->left <= t_wall);
-#if TRACKING == MARCH
+#if TRACKING == TRACKING_MARCH
     Real t = fmin(room, (Real)(params->march_step));
     Mask short_of = MASK(t < room), hit = alive & ~f->ratio & short_of & MASK(f->depth <= rate * t) & MASK(rate > 0.0f);
     ends &= ~short_of;
     Mask crosses = alive & ~hit & ~ends & ~short_of;
 #else
     Mask hit = alive & MASK(f->depth < rate * room);
-#if TRACKING == EXACT
+#if TRACKING == TRACKING_EXACT
     hit &= ~f->ratio;
 #endif
     Real t = select(room, f->depth / rate, hit);
     ends &= ~hit;
     Mask crosses = alive & ~hit & ~ends;
 #endif
-#if TRACKING < DELTA
+#if !BY_MAJORANTS
     if (any_lane(alive & f->ratio)) {
         Real tau = rate * t, at = select((Real)(0.0f), tau, alive & f->ratio);
         if (params->chromatic) {
@@ -289,7 +281,7 @@ static inline Mask fly(constant const View *view, constant const Scattering *par
     f->depth = select(f->depth, free_depth(r->c), hit);
     f->event += as_UInt(select((Int)(0), (Int)(1), hit));
     Real u = unit_open(r->d);
-#if TRACKING < DELTA
+#if !BY_MAJORANTS
     return tell_collisions(params, rate, rate, u, hit, f);
 #else
     Real sigma = density_at(view, params, voxels, f->p) * params->sigma_most;
@@ -327,7 +319,7 @@ static inline void finish(constant const View *view, constant const Scattering *
             RealLanes taken;
             taken.v = select((Real)(0.0f), fmin(y / params->clamp_luminance - 1.0f, (Real)(1e9f)), bright);
             for (int i = 0; i < LANES; i++)
-                if (taken.lane[i] > 0.0f) atom_add((global ulong *)(counts + COUNT_CLAMPED_ENERGY), (ulong)(taken.lane[i] * 65536.0f));
+                if (taken.lane[i] > 0.0f) atom_add((global ulong *)(counts + COUNT_CLAMPED_ENERGY_LOW), (ulong)(taken.lane[i] * 65536.0f));
             light = select3(light, scale3(light, params->clamp_luminance / y), bright);
         }
     }

@@ -11,7 +11,7 @@
 // A gradient by central differences comes in units of this a voxel.
 #define GRADIENT_UNIT (0.5f * INNER_UNIT)
 
-#if INTERPOLATION == TRILINEAR && VOXEL != VOXEL_F32 && !VOLUMES_ARE_IMAGES
+#if INTERPOLATION == INTERPOLATION_TRILINEAR && VOXEL != VOXEL_F32 && !VOLUMES_ARE_IMAGES
 #define INNER_WHOLE 1
 #define INNER_UNIT (1.0f / 32767.0f)
 // A place comes with 16 binary places.
@@ -201,7 +201,7 @@ static inline Real inner_gradient(constant const View *view, VOLUME voxels, Real
 #define INNER_ROUNDING 0.0f
 
 static inline Real inner_raw(constant const View *view, VOLUME voxels, Real3 p) {
-#if INTERPOLATION != TRILINEAR || VOLUMES_ARE_IMAGES
+#if INTERPOLATION != INTERPOLATION_TRILINEAR || VOLUMES_ARE_IMAGES
     return sample_raw(view, voxels, real3(p.x + 0.5f, p.y + 0.5f, p.z + 0.5f));
 #else
     Int ix = to_int(p.x), iy = to_int(p.y), iz = to_int(p.z);

@@ -12,10 +12,6 @@
 #include "shared/phase.h"
 
 #define LIGHT_NUMBERS 16
-#define LIGHT_SUN 0
-#define LIGHT_POINT 1
-#define LIGHT_SPHERE 2
-#define LIGHT_QUAD 3
 #define TURN 6.28318531f
 
 static inline Real magnitude(Real3 c) { return fmax(fabs(c.x), fmax(fabs(c.y), fabs(c.z))); }

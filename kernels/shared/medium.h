@@ -1,5 +1,5 @@
-// What a photon flies through: a box of media, cut by walls (walls.h). GEOMETRY says where a medium is,
-//   BOX      one everywhere               LABELS   one per voxel, by its number
+// What a photon flies through: a box of media, cut by walls (walls.h). MEDIA says where a medium is,
+//   UNIFORM  one everywhere               LABELS   one per voxel, by its number
 //   LAYERS   one per layer along z        DENSITY  one whose extinction is times a voxel's density
 #ifndef SHARED_MEDIUM_H
 #define SHARED_MEDIUM_H
@@ -8,16 +8,11 @@
 #include "shared/phase.h"
 #include "shared/walls.h"
 
-#define BOX 0
-#define LAYERS 1
-#define LABELS 2
-#define DENSITY 3
-
-#define VOXEL_WALLS (TRACKING == EXACT && GEOMETRY >= LABELS)
-#define LAYER_WALLS (TRACKING == EXACT && GEOMETRY == LAYERS)
-#define BLOCK_WALLS (TRACKING >= DELTA)
+#define VOXEL_WALLS (TRACKING == TRACKING_EXACT && (MEDIA == MEDIA_LABELS || MEDIA == MEDIA_DENSITY))
+#define LAYER_WALLS (TRACKING == TRACKING_EXACT && MEDIA == MEDIA_LAYERS)
+#define BLOCK_WALLS (BY_MAJORANTS)
 // Of labels a photon knows how far around its voxel the medium is the same (params->label_bytes), and looks again where that ends.
-#define REACHES (VOXEL_WALLS && GEOMETRY == LABELS)
+#define REACHES (VOXEL_WALLS && MEDIA == MEDIA_LABELS)
 
 static inline Int cell_axis(constant const PhotonTransport *params, int axis, Real p) {
     return cell_on_axis(p, params->low_mm[axis], params->walls_per_mm[axis], params->walls[axis]);
@@ -95,12 +90,12 @@ static inline Int medium_and_reach(constant const PhotonTransport *params, globa
 
 // Which medium is there; with voxel or layer walls the cell says it.
 static inline Int medium_of(constant const PhotonTransport *params, global const float *table, Cell c, Real3 p) {
-#if GEOMETRY == LAYERS
+#if MEDIA == MEDIA_LAYERS
     return LAYER_WALLS ? c.z : layer_at(params, table, p.z);
 #elif REACHES
     Int reach;
     return medium_and_reach(params, table, c, (Mask)(-1), &reach);
-#elif GEOMETRY == LABELS
+#elif MEDIA == MEDIA_LABELS
     Int word = gather_words((global const uchar *)(table + params->at_voxels), voxel_at(params, p) * params->label_bytes);
     return word & (params->label_bytes == 1 ? 0xff : 0xffff);
 #else
@@ -110,7 +105,7 @@ static inline Int medium_of(constant const PhotonTransport *params, global const
 
 // One number of a medium. The table has a number of all media, then the next; up to 16 of them fit in a register.
 static inline Real medium_number(constant const PhotonTransport *params, global const float *table, Int medium, int number) {
-#if GEOMETRY == BOX || GEOMETRY == DENSITY
+#if MEDIA == MEDIA_UNIFORM || MEDIA == MEDIA_DENSITY
     return (Real)(table[number * params->media]);
 #else
 #if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_permvarsf512)
@@ -122,21 +117,22 @@ static inline Real medium_number(constant const PhotonTransport *params, global 
 
 // The refractive index there.
 static inline Real index_of(constant const PhotonTransport *params, global const float *table, Int medium) {
-    return params->mismatch ? medium_number(params, table, medium, 2) : (Real)(params->index);
+    return params->mismatch ? medium_number(params, table, medium, MEDIUM_INDEX) : (Real)(params->index);
 }
 
 static inline Medium medium_all(constant const PhotonTransport *params, global const float *table, Int medium) {
     Medium m;
-    m.extinction = medium_number(params, table, medium, 0), m.albedo = medium_number(params, table, medium, 1);
-    m.kind = to_int(medium_number(params, table, medium, 3));
-    m.a = medium_number(params, table, medium, 4), m.b = medium_number(params, table, medium, 5), m.c = medium_number(params, table, medium, 6);
+    m.extinction = medium_number(params, table, medium, MEDIUM_EXTINCTION), m.albedo = medium_number(params, table, medium, MEDIUM_ALBEDO);
+    m.kind = to_int(medium_number(params, table, medium, MEDIUM_PHASE));
+    m.a = medium_number(params, table, medium, MEDIUM_PHASE_A), m.b = medium_number(params, table, medium, MEDIUM_PHASE_B);
+    m.c = medium_number(params, table, medium, MEDIUM_PHASE_C);
     return m;
 }
 
 // The extinction there, per mm.
 static inline Real extinction_at(constant const PhotonTransport *params, global const float *table, Int medium, Cell c, Real3 p) {
-    Real extinction = medium_number(params, table, medium, 0);
-#if GEOMETRY == DENSITY
+    Real extinction = medium_number(params, table, medium, MEDIUM_EXTINCTION);
+#if MEDIA == MEDIA_DENSITY
     Int voxel = VOXEL_WALLS ? cell_voxel(params, c) : voxel_at(params, p);
     extinction *= gather_reals(table + params->at_voxels, voxel);
 #endif

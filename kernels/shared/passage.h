@@ -12,13 +12,13 @@
 // Counts what leaves the box by a face, by its radius from the beam's axis and its angle to the face.
 static inline void leave(constant const PhotonTransport *params, global const float *table, global ulong *ledger, Gains *gains,
                          const Photon *photon, int axis, Mask up, Mask gone) {
-    gain(&gains->sums[LEDGER_EXIT + 2 * axis], photon->weight, gone & ~up);
-    gain(&gains->sums[LEDGER_EXIT + 2 * axis + 1], photon->weight, gone & up);
+    gain(&gains->sums[LEDGER_EXIT_MINUS_X + 2 * axis], photon->weight, gone & ~up);
+    gain(&gains->sums[LEDGER_EXIT_MINUS_X + 2 * axis + 1], photon->weight, gone & up);
     if (axis != 2) return;
     Mask unscattered = gone & MASK(photon->scatterings == 0);
     if (any_lane(unscattered)) {
-        gain(&gains->sums[LEDGER_UNSCATTERED], photon->weight, unscattered & ~up);
-        gain(&gains->sums[LEDGER_UNSCATTERED + 1], photon->weight, unscattered & up);
+        gain(&gains->sums[LEDGER_UNSCATTERED_MINUS_Z], photon->weight, unscattered & ~up);
+        gain(&gains->sums[LEDGER_UNSCATTERED_PLUS_Z], photon->weight, unscattered & up);
     }
     if (params->radius_bins == 0) return;
     Int side = select((Int)(0), (Int)(1), up);
@@ -27,7 +27,7 @@ static inline void leave(constant const PhotonTransport *params, global const fl
     for (int i = 0; i <= params->radius_bins; i++) ring -= MASK(radius >= table[params->at_radii + i]);
     for (int i = 0; i <= params->angle_bins; i++) cone -= MASK(cosine <= table[params->at_cosines + i]);
     Mask binned = gone & MASK(ring >= 0) & MASK(ring < params->radius_bins) & MASK(cone >= 0) & MASK(cone < params->angle_bins);
-    tally(ledger, LEDGER_BINS + (side * params->radius_bins + ring) * params->angle_bins + cone, photon->weight, binned);
+    tally(ledger, LEDGER_LENGTH + (side * params->radius_bins + ring) * params->angle_bins + cone, photon->weight, binned);
 }
 
 // Takes photons over a wall across one axis, or back from it; returns those that left the box.

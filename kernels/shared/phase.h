@@ -8,9 +8,6 @@
 
 #include "shared/lanes.h"
 
-#define PHASE_LOBES 0
-#define PHASE_RAYLEIGH 1
-#define PHASE_TABLE 2
 
 typedef struct { Real extinction, albedo; Int kind; Real a, b, c; } Medium;
 

@@ -65,13 +65,6 @@ static inline UInt4Lanes draw_ahead(constant const FieldPass *pass, const Photon
     return numbers;
 }
 
-#define SOURCE_PENCIL 0
-#define SOURCE_ISOTROPIC 1
-#define SOURCE_PLANAR 2
-#define SOURCE_DISK 3
-#define SOURCE_CONE 4
-#define SOURCE_DIFFUSE 5
-
 // Adds the paths of photons that have ended.
 static inline void gain_path(constant const PhotonTransport *params, const Photon *photon, Mask ended, Gains *gains) {
     Real path = select((Real)(0.0f), fmin(photon->path * params->paths_per_mm, (Real)(1e15f)), ended);

@@ -18,20 +18,8 @@ static inline void tally_fixed(global ulong *sums, Int cell, ULong amount, Mask 
 
 static inline void tally(global ulong *sums, Int cell, Real amount, Mask active) { tally_fixed(sums, cell, fixed(amount), active); }
 
-#define LEDGER_EXIT 0 // -x, +x, -y, +y, -z, +z
-#define LEDGER_ABSORBED 6
-#define LEDGER_LOST 7
-#define LEDGER_SPECULAR 8
-#define LEDGER_GATED 9
-#define LEDGER_UNSCATTERED 10 // -z, +z
-#define LEDGER_SCATTERINGS 12 // a count, like the next three
-#define LEDGER_FAULTS 13
-#define LEDGER_BROKEN 14
-#define LEDGER_MISSED 15
-#define LEDGER_PATH 16 // in units of params->path_unit_mm
-#define LEDGER_BINS 17 // -z by radius and angle, then +z
-
-// What an item adds to the ledger's first numbers: kept to itself and added once, for all cores would wait for their places.
+// The ledger's entries are LEDGER_…; behind LEDGER_LENGTH of them is the histogram of exits: -z by radius and angle, then +z.
+// What an item adds to the first of them: kept to itself and added once, for all cores would wait for their places.
 typedef struct { ULong sums[LEDGER_SCATTERINGS], path; UInt scatterings; } Gains;
 
 static inline Gains no_gains(void) {

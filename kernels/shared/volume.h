@@ -6,13 +6,9 @@
 #include "shared/lanes.h"
 #include "shared/voxel.h"
 
-// INTERPOLATION: how values lie between voxels.
-#define NEAREST 0
-#define TRILINEAR 1
-#define B_SPLINE 2
-#define CATMULL_ROM 3
+// INTERPOLATION says how values lie between voxels.
 #ifndef INTERPOLATION
-#define INTERPOLATION TRILINEAR
+#error "a kernel that reads volumes is built with an INTERPOLATION"
 #endif
 
 // A volume is a buffer; on a GPU it is a 3D image, whose sampler interpolates in hardware (its weights have 8 fractional bits).
@@ -57,7 +53,7 @@ static inline Real nearest_raw(constant const View *view, VOLUME voxels, Real3 p
     return voxel_raw(view, voxels, to_int(floor(p.x)), to_int(floor(p.y)), to_int(floor(p.z)));
 }
 
-#if INTERPOLATION == TRILINEAR || INTERPOLATION == NEAREST
+#if INTERPOLATION == INTERPOLATION_TRILINEAR || INTERPOLATION == INTERPOLATION_NEAREST
 #define TAPS 2
 #else
 #define TAPS 4
@@ -72,7 +68,7 @@ static inline void tap_weights(Real f, Real weight[TAPS], Real slope[TAPS]) {
     slope[0] = (Real)(-1.0f), slope[1] = (Real)(1.0f);
 #else
     Real g = 1.0f - f, ff = f * f, gg = g * g;
-#if INTERPOLATION == B_SPLINE
+#if INTERPOLATION == INTERPOLATION_B_SPLINE
     weight[0] = gg * g * (1.0f / 6.0f), weight[3] = ff * f * (1.0f / 6.0f);
     weight[1] = mad(ff, 0.5f * f - 1.0f, (Real)(2.0f / 3.0f)), weight[2] = mad(gg, 0.5f * g - 1.0f, (Real)(2.0f / 3.0f));
     slope[0] = -0.5f * gg, slope[3] = 0.5f * ff;
@@ -156,9 +152,9 @@ static inline Real trilinear_raw(constant const View *view, VOLUME voxels, Real3
 
 // The raw value at p by the interpolation that is compiled in.
 static inline Real sample_raw(constant const View *view, VOLUME voxels, Real3 p) {
-#if INTERPOLATION == NEAREST
+#if INTERPOLATION == INTERPOLATION_NEAREST
     return nearest_raw(view, voxels, p);
-#elif INTERPOLATION == TRILINEAR
+#elif INTERPOLATION == INTERPOLATION_TRILINEAR
     return trilinear_raw(view, voxels, p);
 #else
     Real3 unused;

@@ -9,7 +9,7 @@
 #include "shared/lanes.h"
 #include "shared/volume.h"
 
-#if INTERPOLATION == NEAREST
+#if INTERPOLATION == INTERPOLATION_NEAREST
 #define WALK_PLANE 0.0f
 #else
 #define WALK_PLANE 0.5f
@@ -31,7 +31,7 @@ static inline Crossing crossing_from(Real origin, Real direction, Real t, int n)
     c.inverse = 1.0f / d;
     c.towards = copysign((Real)(1.0f), d);
     c.plane = select(ceil(at) - 1.0f, floor(at) + 1.0f, MASK(d > 0.0f));
-    c.last = (float)(INTERPOLATION == NEAREST ? n : n - 1);
+    c.last = (float)(INTERPOLATION == INTERPOLATION_NEAREST ? n : n - 1);
     return c;
 }
 
@@ -41,7 +41,7 @@ static inline Real crossing_time(const Crossing *c) {
     return select((Real)(1e30f), t, MASK(c->plane >= 0.0f) & MASK(c->plane <= c->last));
 }
 
-#if INTERPOLATION == TRILINEAR
+#if INTERPOLATION == INTERPOLATION_TRILINEAR
 typedef struct { Real3 low; Real v[8]; } Corners;
 
 #if VOLUMES_ARE_IMAGES
@@ -131,11 +131,11 @@ static inline void stretch_peak(const Corners *c, float sign, Real3 o, Real3 d, 
 static inline Real stretch(constant const View *view, VOLUME voxels, float sign, int peaks, Real3 o, Real3 d, Real t, Real length,
                            Mask on, Real *best) {
     Real middle = mad(length, (Real)(0.5f), t);
-#if INTERPOLATION == NEAREST
+#if INTERPOLATION == INTERPOLATION_NEAREST
     Real v = nearest_raw(view, voxels, along(o, d, middle));
     *best = select(*best, sign * v, on & MASK(sign * v > *best));
     return v;
-#elif INTERPOLATION == TRILINEAR
+#elif INTERPOLATION == INTERPOLATION_TRILINEAR
     Corners c = corners_at(view, voxels, along(o, d, middle));
     if (peaks) {
         stretch_peak(&c, sign, o, d, t, length, on, best);

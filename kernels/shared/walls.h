@@ -11,10 +11,7 @@
 
 #include "shared/lanes.h"
 
-#define EXACT 0
-#define MARCH 1
-#define DELTA 2
-#define WEIGHTED 3
+#define BY_MAJORANTS (TRACKING == TRACKING_DELTA || TRACKING == TRACKING_WEIGHTED)
 
 // A voxel, a layer (z) or a block.
 typedef struct { Int x, y, z; } Cell;
@@ -33,10 +30,10 @@ static inline Real distance_to(Real wall, Real p, Real d) {
     return select(fmax((wall - p) * reciprocal(d), (Real)(0.0f)), (Real)(1e30f), MASK(fabs(d) < 1e-12f));
 }
 
-#if TRACKING >= DELTA
+#if BY_MAJORANTS
 // Which of the tentative collisions `hit` are real, by the number u; a weight is times *factor.
 static inline Mask real_collisions(Real sigma, Real rate, Real u, Mask hit, Real *factor) {
-#if TRACKING == DELTA
+#if TRACKING == TRACKING_DELTA
     *factor = (Real)(1.0f);
     return hit & MASK(u * rate < sigma);
 #else

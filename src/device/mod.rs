@@ -4,6 +4,7 @@
 
 pub mod cells;
 pub mod develop;
+pub mod enums;
 mod images;
 mod include;
 mod launch;

@@ -2,9 +2,18 @@
 
 use std::path::Path;
 
+use super::enums::DeviceEnum;
 use super::include::{assemble, read};
 use crate::error::{Error, Result};
 use crate::volume::VoxelType;
+
+impl DeviceEnum for VoxelType {
+    const PREFIX: &'static str = "VOXEL";
+    const ALL: &'static [Self] = &VoxelType::ALL;
+    fn number(self) -> i32 {
+        self as i32
+    }
+}
 
 /// The `-D NAME=VALUE` options of a variant.
 pub type Features = &'static [(&'static str, i32)];
@@ -43,7 +52,7 @@ pub struct Variant {
 pub struct Source {
     /// The kernel file's name, without `.cl`.
     pub kernel: &'static str,
-    /// The OpenCL C text of its device structs.
+    /// The OpenCL C text of its device structs and enums.
     pub structs: fn() -> String,
     /// Every variant that may be built.
     pub variants: fn() -> Vec<Variant>,
@@ -58,7 +67,7 @@ impl Source {
     /// [`Error::Internal`] when a file is missing, or files include each other in a circle.
     pub fn text(&self, overrides: Option<&Path>) -> Result<String> {
         let kernel = assemble(&format!("{}.cl", self.kernel), &|name| read(overrides, name))?;
-        Ok(format!("#line 1 \"structs\"\n{}{kernel}", (self.structs)()))
+        Ok(format!("#line 1 \"structs\"\n{}{}{kernel}", VoxelType::opencl_text(), (self.structs)()))
     }
 }
 
@@ -80,20 +89,11 @@ impl Variant {
         if strict {
             options += " -Werror";
         }
-        for (name, code) in [("VOXEL_U8", 0), ("VOXEL_I16", 1), ("VOXEL_U16", 2), ("VOXEL_F32", 3)] {
-            options += &format!(" -D{name}={code}");
-        }
         if images {
             options += " -DVOLUMES_ARE_IMAGES=1";
         }
         if let Some(voxel) = self.voxel {
-            let code = match voxel {
-                VoxelType::U8 => 0,
-                VoxelType::I16 => 1,
-                VoxelType::U16 => 2,
-                VoxelType::F32 => 3,
-            };
-            options += &format!(" -DVOXEL={code}");
+            options += &format!(" -DVOXEL={}", voxel.number());
         }
         for (name, value) in self.features {
             options += &format!(" -D{name}={value}");

@@ -12,6 +12,7 @@ use super::rounds::Rounds;
 use super::view_run::Pass;
 use crate::device::Buffer;
 use crate::device::develop::{Developer, Look, Set};
+use crate::device::enums::{Count, DeviceEnum};
 use crate::error::Result;
 use crate::film::picture::Background;
 use crate::film::{Film, Lowered};
@@ -229,12 +230,19 @@ impl Gathered {
     }
 
     fn read_counts(&self, context: &DeviceContext) -> Result<SampleCounts> {
-        let mut counts = [0u32; 8];
+        let mut counts = [0u32; Count::LENGTH];
         context.device.read(&self.counts, 0, &mut counts)?;
-        let [non_finite, fireflies, clamped, broken, low, high, cut, _] = counts;
+        let of = |count: Count| counts[count as usize];
         let unit = self.random.and_then(|r| r.clamp_luminance).unwrap_or(0.0) / 65536.0;
-        let clamped_luminance = (u64::from(high) << 32 | u64::from(low)) as f64 * unit;
-        Ok(SampleCounts { non_finite, fireflies, clamped, broken, clamped_luminance, cut })
+        let clamped = u64::from(of(Count::ClampedEnergyHigh)) << 32 | u64::from(of(Count::ClampedEnergyLow));
+        Ok(SampleCounts {
+            non_finite: of(Count::NonFinite),
+            fireflies: of(Count::Fireflies),
+            clamped: of(Count::Clamped),
+            broken: of(Count::Broken),
+            clamped_luminance: clamped as f64 * unit,
+            cut: of(Count::Cut),
+        })
     }
 }
 

@@ -3,6 +3,34 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use crate::device_enum;
+
+device_enum! {
+    /// How free paths are found (`kernels/shared/walls.h`).
+    pub enum Tracking: "TRACKING" {
+        /// In closed form from one change of the extinction to the next.
+        Exact,
+        /// In steps of one length.
+        March,
+        /// By Woodcock's method, with majorants.
+        Delta,
+        /// By the same with weights, for majorants that may be too small.
+        Weighted,
+    }
+}
+
+impl Tracking {
+    /// Its name in requests and replies.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Exact => "exact",
+            Self::March => "march",
+            Self::Delta => "delta",
+            Self::Weighted => "weighted",
+        }
+    }
+}
+
 /// The majorants of delta and weighted tracking.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]

@@ -16,10 +16,12 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
+use crate::device::enums::{Count, DeviceEnum};
 use crate::device::program::{Source, Variant};
-use crate::device::structs::View as DeviceView;
+use crate::device::structs::{DeviceStruct, View as DeviceView};
 use crate::error::Result;
 use crate::scene::camera::{Camera, Framing};
+use crate::scene::interpolation::Interpolation;
 use crate::volume::{Store, Volume};
 
 /// Every technique. Adding one is one line.
@@ -32,6 +34,19 @@ pub const ALL: &[Technique] = &[
     slice::TECHNIQUE,
     volume_path::TECHNIQUE,
 ];
+
+impl DeviceEnum for Interpolation {
+    const PREFIX: &'static str = "INTERPOLATION";
+    const ALL: &'static [Self] = &[Self::Nearest, Self::Trilinear, Self::BSpline, Self::CatmullRom];
+    fn number(self) -> i32 {
+        self.code()
+    }
+}
+
+/// The OpenCL C text that all views share: the camera and the pass, and the names of interpolations and counts.
+pub(crate) fn view_text() -> String {
+    DeviceView::opencl_text() + &Interpolation::opencl_text() + &Count::opencl_text()
+}
 
 /// What the service knows of a technique.
 pub struct Technique {

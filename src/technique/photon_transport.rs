@@ -53,12 +53,14 @@ use glam::{DAffine3, DMat3, DVec3};
 use serde_json::{Value, json};
 
 use super::{Field, FieldPlan, FieldResult, Kind, Technique};
+use crate::device::enums::{DeviceEnum, PhaseKind};
 use crate::device::program::{Source, Variant};
 use crate::device::structs::DeviceStruct;
 use crate::error::{Error, Result};
 use crate::request;
 use crate::scene::camera::Framing;
 use crate::volume::{NewVolume, Store, Volume, Voxels};
+use device::{BoundaryKind, LedgerEntry, Media, MediumNumber, SourceKind, Tally};
 pub use device::{FieldPass, PhotonTransport};
 use geometry::Geometry;
 use parameters::Parameters;
@@ -78,8 +80,6 @@ pub const TECHNIQUE: Technique = Technique {
 
 /// `FIXED_ONE` of the kernel: sums are in units of 2^-30.
 const FIXED_ONE: f64 = 1_073_741_824.0;
-/// Entries of the kernel's ledger before the histogram.
-const LEDGER_BINS: usize = 17;
 
 /// A request that works as it is.
 pub fn example() -> Value {
@@ -95,13 +95,11 @@ fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
         structs: || {
-            "#pragma OPENCL EXTENSION cl_khr_int64_base_atomics : enable\n\
-             #define TALLY_ABSORBED 0\n#define TALLY_FLUENCE 1\n#define TALLY_FLUENCE_TRACK 2\n#define TALLY_GATHER 3\n\
-             #define TALLY_ABSORBED_TRACK 4\n\
-             #define BOUNDARY_ABSORBING 0\n#define BOUNDARY_CYCLIC 1\n#define BOUNDARY_MIRROR 2\n"
-                .to_owned()
-                + &FieldPass::opencl_text()
-                + &PhotonTransport::opencl_text()
+            "#pragma OPENCL EXTENSION cl_khr_int64_base_atomics : enable\n".to_owned()
+                + &[FieldPass::opencl_text(), PhotonTransport::opencl_text()].concat()
+                + &[Media::opencl_text(), MediumNumber::opencl_text(), PhaseKind::opencl_text()].concat()
+                + &[Tracking::opencl_text(), SourceKind::opencl_text(), BoundaryKind::opencl_text()].concat()
+                + &[Tally::opencl_text(), LedgerEntry::opencl_text()].concat()
         },
         variants: || plan::FEATURES.iter().map(|f| Variant::new(TECHNIQUE.name, None, f)).collect(),
         common: 2,

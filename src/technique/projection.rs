@@ -39,10 +39,10 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::steps::coarse_step;
-use super::{CellUse, Kind, Technique, View, ViewPlan};
+use super::{CellUse, Kind, Technique, View, ViewPlan, view_text};
+use crate::device::enums::DeviceEnum;
 use crate::device::program::{Source, Variant, listed};
 use crate::device::structs::{DeviceStruct, View as DeviceView};
-use crate::device_struct;
 use crate::error::{Error, Result};
 use crate::request;
 use crate::scene;
@@ -51,6 +51,7 @@ use crate::scene::interpolation::Interpolation;
 use crate::scene::presets::is_hounsfield;
 use crate::scene::window::{ColorMap, Output, Window, WindowRequest};
 use crate::volume::{Volume, VoxelType};
+use crate::{device_enum, device_struct};
 
 /// The optical depth of a bright ray in an X-ray by default: an eighth gets through.
 const XRAY_OPTICAL_DEPTH: f64 = 2.0;
@@ -68,7 +69,7 @@ pub const TECHNIQUE: Technique = Technique {
 device_struct! {
     /// The kernel's own parameters.
     pub struct Projection {
-        /// `MODE_…` in the kernel.
+        /// A [`DeviceMode`].
         pub mode: i32,
         /// 1 to look for the greatest raw value, −1 for the least.
         pub sign: f32,
@@ -88,6 +89,31 @@ device_struct! {
         pub raw_values: i32,
         /// Whether the cells' ranges are looked at.
         pub skipping: i32,
+    }
+}
+
+device_enum! {
+    /// What the kernel makes of the values along a ray.
+    pub enum DeviceMode: "PROJECTION" {
+        /// The greatest of sign times the value.
+        Peak,
+        /// The mean.
+        Mean,
+        /// The integral.
+        Sum,
+        /// The transmittance.
+        Xray,
+    }
+}
+
+impl Mode {
+    fn on_device(self) -> DeviceMode {
+        match self {
+            Self::Maximum | Self::Minimum => DeviceMode::Peak,
+            Self::Mean => DeviceMode::Mean,
+            Self::Sum => DeviceMode::Sum,
+            Self::Xray => DeviceMode::Xray,
+        }
     }
 }
 
@@ -195,7 +221,7 @@ fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
 fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
-        structs: || DeviceView::opencl_text() + &Projection::opencl_text(),
+        structs: || view_text() + &Projection::opencl_text() + &DeviceMode::opencl_text(),
         variants: || FEATURES.iter().flat_map(|f| VoxelType::ALL.map(|t| variant(t, f))).collect(),
         common: 2 * VoxelType::ALL.len(),
     }
@@ -297,12 +323,7 @@ impl View for Parameters {
         let [window_scale, window_offset] = self.window(volume)?.scale_and_offset();
         let wanted = if self.mode == Mode::Minimum { -1.0 } else { 1.0 };
         let device = Projection {
-            mode: match self.mode {
-                Mode::Maximum | Mode::Minimum => 0,
-                Mode::Mean => 1,
-                Mode::Sum => 2,
-                Mode::Xray => 3,
-            },
+            mode: self.mode.on_device().code(),
             sign: (wanted * volume.slope().signum()) as f32,
             slope: volume.slope() as f32,
             inter: volume.inter() as f32,

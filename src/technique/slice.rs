@@ -31,7 +31,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::{CellUse, Kind, Technique, View, ViewPlan};
+use super::{CellUse, Kind, Technique, View, ViewPlan, view_text};
 use crate::device::program::{Source, Variant, listed};
 use crate::device::structs::{DeviceStruct, View as DeviceView};
 use crate::device_struct;
@@ -177,7 +177,7 @@ fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
 fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
-        structs: || DeviceView::opencl_text() + &Slice::opencl_text(),
+        structs: || view_text() + &Slice::opencl_text(),
         variants: || FEATURES.iter().flat_map(|f| VoxelType::ALL.map(|t| variant(t, f))).collect(),
         common: VoxelType::ALL.len(),
     }

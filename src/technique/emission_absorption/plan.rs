@@ -12,7 +12,7 @@ use crate::scene::interpolation::Interpolation;
 use crate::scene::presets;
 use crate::scene::transfer::{TABLE_SIZE, TransferFunction, pack};
 use crate::technique::steps::coarse_step;
-use crate::technique::{CellUse, View, ViewPlan};
+use crate::technique::{CellUse, View, ViewPlan, view_text};
 use crate::volume::{Volume, VoxelType};
 
 type Features = [(&'static str, i32); 5];
@@ -71,7 +71,7 @@ fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
 pub(super) fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
-        structs: || DeviceView::opencl_text() + &EmissionAbsorption::opencl_text(),
+        structs: || view_text() + &EmissionAbsorption::opencl_text(),
         variants: || FEATURES.iter().flat_map(|f| VoxelType::ALL.map(|t| variant(t, f))).collect(),
         common: COMMON * VoxelType::ALL.len(),
     }

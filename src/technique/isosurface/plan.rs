@@ -12,7 +12,7 @@ use crate::scene::camera::Camera;
 use crate::scene::interpolation::Interpolation;
 use crate::scene::light::LightRequest;
 use crate::technique::steps::coarse_step;
-use crate::technique::{CellUse, View, ViewPlan};
+use crate::technique::{CellUse, View, ViewPlan, view_text};
 use crate::volume::{Volume, VoxelType};
 
 /// How closely a crossing is located, in voxels.
@@ -53,7 +53,7 @@ fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
 pub(super) fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
-        structs: || DeviceView::opencl_text() + &Isosurface::opencl_text(),
+        structs: || view_text() + &Isosurface::opencl_text(),
         variants: || FEATURES.iter().flat_map(|f| VoxelType::ALL.map(|t| variant(t, f))).collect(),
         common: VoxelType::ALL.len(),
     }

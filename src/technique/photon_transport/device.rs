@@ -1,6 +1,127 @@
 //! What `kernels/photon_transport.cl` is told.
 
-use crate::device_struct;
+use crate::{device_enum, device_struct};
+
+device_enum! {
+    /// Where the media are (`kernels/shared/medium.h`).
+    pub enum Media: "MEDIA" {
+        /// One everywhere.
+        Uniform,
+        /// One per layer along z.
+        Layers,
+        /// One per voxel, by its label.
+        Labels,
+        /// One whose extinction is times a voxel's density.
+        Density,
+    }
+}
+
+device_enum! {
+    /// Numbers of a medium in the table.
+    pub enum MediumNumber: "MEDIUM" {
+        /// Extinction per mm.
+        Extinction,
+        /// Albedo.
+        Albedo,
+        /// Refractive index.
+        Index,
+        /// Kind of its phase function.
+        Phase,
+        /// Three parameters of the kind.
+        PhaseA,
+        /// See `PhaseA`.
+        PhaseB,
+        /// See `PhaseA`.
+        PhaseC,
+    }
+}
+
+device_enum! {
+    /// What is at the ends of the media.
+    pub enum BoundaryKind: "BOUNDARY" {
+        /// Nothing.
+        Absorbing,
+        /// The other side.
+        Cyclic,
+        /// A mirror.
+        Mirror,
+    }
+}
+
+device_enum! {
+    /// What the grid holds, and by which estimator.
+    pub enum Tally: "TALLY" {
+        /// Absorbed energy, by collisions.
+        Absorbed,
+        /// Fluence, by collisions.
+        Fluence,
+        /// Fluence, by track length.
+        FluenceTrack,
+        /// Radiance towards the eye, by collisions.
+        Gather,
+        /// Absorbed energy, by track length.
+        AbsorbedTrack,
+    }
+}
+
+device_enum! {
+    /// Where photons come from (`kernels/shared/photon.h`).
+    pub enum SourceKind: "SOURCE" {
+        /// One ray.
+        Pencil,
+        /// A point that shines everywhere.
+        Isotropic,
+        /// Parallel rays from a parallelogram.
+        Planar,
+        /// Parallel rays from a disk.
+        Disk,
+        /// A point that shines into a cone.
+        Cone,
+        /// A Lambertian disk.
+        Diffuse,
+    }
+}
+
+device_enum! {
+    /// Entries of the ledger before the histogram. The first ten are weights that add up to all that was launched, the next two are parts
+    /// of exits; the others count.
+    pub enum LedgerEntry: "LEDGER" {
+        /// Left at x = 0. The exits are in the order of axes, the lower end of each first.
+        ExitMinusX,
+        /// Left at the other end of x.
+        ExitPlusX,
+        /// Left at y = 0.
+        ExitMinusY,
+        /// Left at the other end of y.
+        ExitPlusY,
+        /// Left at z = 0.
+        ExitMinusZ,
+        /// Left at the other end of z.
+        ExitPlusZ,
+        /// Absorbed.
+        Absorbed,
+        /// Lost in the roulette (or gained: below 0), by faults, or past the box.
+        Lost,
+        /// Reflected where the beam enters.
+        Specular,
+        /// Taken out by the time gate.
+        Gated,
+        /// Left at z = 0 without a scattering.
+        UnscatteredMinusZ,
+        /// Left at the other end of z without a scattering.
+        UnscatteredPlusZ,
+        /// Scatterings.
+        Scatterings,
+        /// Photons of too many steps, or whose weight is not finite.
+        Faults,
+        /// Collisions at which the majorant was below the extinction.
+        Broken,
+        /// Photons that flew past the box.
+        Missed,
+        /// Length of paths, in units of `Simulation::path_unit_mm`.
+        Path,
+    }
+}
 
 device_struct! {
     /// Which histories a launch takes.
@@ -39,7 +160,7 @@ device_struct! {
         pub high_mm: [f32; 3],
         /// Whether they go further than the grid.
         pub endless: i32,
-        /// What is at their ends: 0 nothing (absorbing), 1 the other side (cyclic), 2 a mirror.
+        /// What is at their ends: a [`BoundaryKind`] per axis.
         pub boundary: [i32; 3],
         /// Cells between walls, along each axis.
         pub walls: [i32; 3],
@@ -83,7 +204,7 @@ device_struct! {
         pub gate_mm: f32,
         /// The march's step.
         pub march_step_mm: f32,
-        /// The source's number.
+        /// A [`SourceKind`].
         pub source_type: i32,
         /// Where it is.
         pub source: [f32; 3],
@@ -99,7 +220,7 @@ device_struct! {
         pub roulette_threshold: f32,
         /// Probability to survive it.
         pub roulette_survival: f32,
-        /// What is added up: see the `TALLY_` names.
+        /// What is added up: a [`Tally`].
         pub tally: i32,
         /// Deposits of length are times this.
         pub deposit_scale: f32,

@@ -4,10 +4,12 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::attenuation::Attenuation;
+use super::device::MediumNumber;
+use crate::device::enums::DeviceEnum;
 use crate::scene::phase::Phase;
 
-/// Numbers of a medium in the kernel's table.
-const NUMBERS: usize = 8;
+/// Numbers of a medium that the kernel's table has room for.
+const NUMBERS: usize = MediumNumber::LENGTH + 1;
 
 /// A homogeneous medium.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
@@ -60,8 +62,9 @@ pub fn table(media: &[Medium]) -> Vec<f32> {
     for (i, medium) in media.iter().enumerate() {
         let [kind, a, b, c] = medium.phase.numbers(&mut rows, NUMBERS * room);
         let (extinction, albedo) = (medium.extinction_per_mm() as f32, medium.albedo() as f32);
-        for (number, value) in [extinction, albedo, medium.index as f32, kind, a, b, c].into_iter().enumerate() {
-            table[number * room + i] = value;
+        let numbers: [f32; MediumNumber::LENGTH] = [extinction, albedo, medium.index as f32, kind, a, b, c];
+        for (number, value) in MediumNumber::ALL.iter().zip(numbers) {
+            table[*number as usize * room + i] = value;
         }
     }
     table.extend(rows);

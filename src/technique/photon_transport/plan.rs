@@ -3,10 +3,12 @@
 use std::f64::consts::PI;
 
 use super::attenuation::{self, LEAST_KEV, ROWS};
+use super::device::{BoundaryKind, LedgerEntry, Media, Tally};
 use super::geometry::{Geometry, Where};
 use super::parameters::Parameters;
 use super::tracking::{Tracking, majorants};
-use super::{LEDGER_BINS, PhotonTransport, Simulation, TECHNIQUE, medium};
+use super::{PhotonTransport, Simulation, TECHNIQUE, medium};
+use crate::device::enums::DeviceEnum;
 use crate::device::program::{Variant, listed};
 use crate::error::Result;
 use crate::technique::FieldPlan;
@@ -18,35 +20,37 @@ const ENDLESS_MM: f32 = 1e30;
 
 type Features = [(&'static str, i32); 3];
 
-/// Every geometry with every tracker; the first is the chamber's, the second the homogeneous box.
+/// Every kind of media with every tracker; the first is the chamber's, the second the homogeneous box.
 pub(super) static FEATURES: [Features; 20] = {
-    const fn of(geometry: i32, tracking: i32) -> Features {
-        [("GEOMETRY", geometry), ("TRACKING", tracking), ("GAMMA", 0)]
+    use Media::{Density, Labels, Layers, Uniform};
+    use Tracking::{Delta, Exact, March, Weighted};
+    const fn of(media: Media, tracking: Tracking) -> Features {
+        [("MEDIA", media.code()), ("TRACKING", tracking.code()), ("GAMMA", 0)]
     }
-    const fn gamma(geometry: i32) -> Features {
-        [("GEOMETRY", geometry), ("TRACKING", 0), ("GAMMA", 1)]
+    const fn gamma(media: Media) -> Features {
+        [("MEDIA", media.code()), ("TRACKING", Exact.code()), ("GAMMA", 1)]
     }
     [
-        of(3, 0),
-        of(0, 0),
-        of(1, 0),
-        of(2, 0),
-        of(0, 1),
-        of(1, 1),
-        of(2, 1),
-        of(3, 1),
-        of(0, 2),
-        of(1, 2),
-        of(2, 2),
-        of(3, 2),
-        of(0, 3),
-        of(1, 3),
-        of(2, 3),
-        of(3, 3),
-        gamma(0),
-        gamma(1),
-        gamma(2),
-        gamma(3),
+        of(Density, Exact),
+        of(Uniform, Exact),
+        of(Layers, Exact),
+        of(Labels, Exact),
+        of(Uniform, March),
+        of(Layers, March),
+        of(Labels, March),
+        of(Density, March),
+        of(Uniform, Delta),
+        of(Layers, Delta),
+        of(Labels, Delta),
+        of(Density, Delta),
+        of(Uniform, Weighted),
+        of(Layers, Weighted),
+        of(Labels, Weighted),
+        of(Density, Weighted),
+        gamma(Uniform),
+        gamma(Layers),
+        gamma(Labels),
+        gamma(Density),
     ]
 };
 
@@ -55,13 +59,13 @@ fn permitted(wanted: Features) -> Result<&'static Features> {
 }
 
 fn features(geometry: &Geometry, tracking: Tracking) -> Result<&'static Features> {
-    let place = match geometry.place {
-        Where::Box => 0,
-        Where::Layers(_) => 1,
-        Where::Labels { .. } => 2,
-        Where::Density(_) => 3,
+    let media = match geometry.place {
+        Where::Box => Media::Uniform,
+        Where::Layers(_) => Media::Layers,
+        Where::Labels { .. } => Media::Labels,
+        Where::Density(_) => Media::Density,
     };
-    permitted([("GEOMETRY", place), ("TRACKING", tracking as i32), ("GAMMA", geometry.is_gamma().into())])
+    permitted([("MEDIA", media.code()), ("TRACKING", tracking.code()), ("GAMMA", geometry.is_gamma().into())])
 }
 
 /// Appends to the table and says where.
@@ -90,13 +94,13 @@ impl Simulation {
         self.parameters.tally == "absorbed"
     }
 
-    fn tally_code(&self) -> i32 {
+    fn tally(&self) -> Tally {
         match (self.parameters.tally.as_str(), self.track) {
-            ("absorbed", false) => 0,
-            ("fluence", false) => 1,
-            ("fluence", true) => 2,
-            ("radiance_gather", _) => 3,
-            _ => 4,
+            ("absorbed", false) => Tally::Absorbed,
+            ("fluence", false) => Tally::Fluence,
+            ("fluence", true) => Tally::FluenceTrack,
+            ("radiance_gather", _) => Tally::Gather,
+            _ => Tally::AbsorbedTrack,
         }
     }
 
@@ -133,11 +137,12 @@ impl Simulation {
         device.size_mm = device.high_mm;
         let layered = matches!(self.geometry.place, Where::Layers(_));
         for (a, kind) in [&p.boundary.x, &p.boundary.y, &p.boundary.z].into_iter().enumerate() {
-            device.boundary[a] = match kind.as_deref() {
-                Some("cyclic") => 1,
-                Some("mirror") => 2,
-                _ => 0,
+            let boundary = match kind.as_deref() {
+                Some("cyclic") => BoundaryKind::Cyclic,
+                Some("mirror") => BoundaryKind::Mirror,
+                _ => BoundaryKind::Absorbing,
             };
+            device.boundary[a] = boundary.code();
             // Layers go on to all sides unless the request says where they end.
             if layered && a < 2 && kind.is_none() {
                 (device.low_mm[a], device.high_mm[a], device.endless) = (-ENDLESS_MM, ENDLESS_MM, 1);
@@ -168,7 +173,7 @@ impl Simulation {
             march_step_mm: self.march_step_mm() as f32,
             roulette_threshold: p.roulette.threshold as f32,
             roulette_survival: p.roulette.survival as f32,
-            tally: self.tally_code(),
+            tally: self.tally().code(),
             deposit_scale: self.deposit_scale() as f32,
             paths_per_mm: (1.0 / self.path_unit_mm()) as f32,
             eye_mm: self.eye_mm().map(|v| v as f32),
@@ -225,7 +230,7 @@ impl Simulation {
             parameters: bytemuck::bytes_of(&device).to_vec(),
             table,
             cells: g.dims.iter().product(),
-            ledger: LEDGER_BINS + bins,
+            ledger: LedgerEntry::LENGTH + bins,
             histories: p.photons,
             reasons: self.reasons.clone(),
         })
@@ -266,8 +271,8 @@ mod tests {
 
     #[test]
     fn features_that_are_not_listed_are_an_error_that_names_them() {
-        assert!(permitted([("GEOMETRY", 3), ("TRACKING", 0), ("GAMMA", 1)]).is_ok());
-        let said = permitted([("GEOMETRY", 3), ("TRACKING", 2), ("GAMMA", 1)]).expect_err("not listed").to_string();
-        assert!(said.contains("photon_transport GEOMETRY=3 TRACKING=2 GAMMA=1"), "{said}");
+        assert!(permitted([("MEDIA", 3), ("TRACKING", 0), ("GAMMA", 1)]).is_ok());
+        let said = permitted([("MEDIA", 3), ("TRACKING", 2), ("GAMMA", 1)]).expect_err("not listed").to_string();
+        assert!(said.contains("photon_transport MEDIA=3 TRACKING=2 GAMMA=1"), "{said}");
     }
 }

@@ -2,10 +2,12 @@
 
 use serde_json::{Map, Value, json};
 
-use super::{FIXED_ONE, LEDGER_BINS, Simulation};
+use super::device::LedgerEntry;
+use super::{FIXED_ONE, Simulation};
+use crate::device::enums::DeviceEnum;
 use crate::technique::majorant::march_bias;
 
-/// The ledger's fractions, in the kernel's order: the first ten add up to 1, the last two are parts of exits.
+/// The ledger's fractions, in the order of [`LedgerEntry`]: the first ten add up to 1, the last two are parts of exits.
 pub const FRACTIONS: [&str; 12] = [
     "exit_minus_x",
     "exit_plus_x",
@@ -20,11 +22,6 @@ pub const FRACTIONS: [&str; 12] = [
     "unscattered_minus_z",
     "unscattered_plus_z",
 ];
-const SCATTERINGS: usize = 12;
-const FAULTS: usize = 13;
-const BROKEN: usize = 14;
-const MISSED: usize = 15;
-const PATH: usize = 16;
 /// Sums past this may soon wrap round.
 const OVERFLOW: u64 = 1 << 61;
 
@@ -59,7 +56,7 @@ impl Simulation {
         let n = ledgers.histories as f64;
         let fractions: Map<String, Value> =
             FRACTIONS.iter().enumerate().map(|(entry, name)| ((*name).into(), ledgers.fraction(entry))).collect();
-        let overflow = (0..LEDGER_BINS).any(|e| ledgers.sum(e).unsigned_abs() > OVERFLOW)
+        let overflow = (0..LedgerEntry::LENGTH).any(|e| ledgers.sum(e).unsigned_abs() > OVERFLOW)
             || grid.iter().any(|v| (*v as i64).unsigned_abs() > OVERFLOW);
         let mut warnings = Vec::new();
         let mut warn = |code: &str, measured: f64, message: &str| {
@@ -67,14 +64,18 @@ impl Simulation {
                 warnings.push(json!({"code": code, "message": message, "measured": measured, "bound": 0}));
             }
         };
-        warn("broken_majorant", ledgers.sum(BROKEN) as f64, self.broken_words());
+        warn("broken_majorant", ledgers.sum(LedgerEntry::Broken as usize) as f64, self.broken_words());
         warn(
             "photon_faults",
-            ledgers.sum(FAULTS) as f64,
+            ledgers.sum(LedgerEntry::Faults as usize) as f64,
             "photons took too many steps, as where nothing lets them out, or their weight was not finite: their weight is in lost",
         );
         warn("sums_overflow", f64::from(overflow), "the 64-bit sums are about to overflow: ask for fewer photons");
-        warn("beam_misses", ledgers.sum(MISSED) as f64, "photons flew past the box: their weight is in lost");
+        warn(
+            "beam_misses",
+            ledgers.sum(LedgerEntry::Missed as usize) as f64,
+            "photons flew past the box: their weight is in lost",
+        );
         warn(
             "march_bias",
             self.march_bias(),
@@ -83,11 +84,11 @@ impl Simulation {
         let mut result = json!({
             "photons": ledgers.histories,
             "ledger": fractions,
-            "mean_scatterings": ledgers.sum(SCATTERINGS) as f64 / n,
-            "mean_path_mm": ledgers.sum(PATH) as f64 * self.path_unit_mm() / n,
-            "faults": ledgers.sum(FAULTS),
-            "broken_majorants": ledgers.sum(BROKEN),
-            "missed": ledgers.sum(MISSED),
+            "mean_scatterings": ledgers.sum(LedgerEntry::Scatterings as usize) as f64 / n,
+            "mean_path_mm": ledgers.sum(LedgerEntry::Path as usize) as f64 * self.path_unit_mm() / n,
+            "faults": ledgers.sum(LedgerEntry::Faults as usize),
+            "broken_majorants": ledgers.sum(LedgerEntry::Broken as usize),
+            "missed": ledgers.sum(LedgerEntry::Missed as usize),
             "overflow": overflow,
             "tracking": self.tracking.name(),
             "tracking_reason": self.tracking_reason,
@@ -98,8 +99,9 @@ impl Simulation {
         if let Some(histogram) = &self.parameters.exit_histogram {
             let (rings, cones) = (histogram.radius_edges_mm.len() - 1, histogram.angle_edges_deg.len() - 1);
             let side = |side: usize| -> Vec<Vec<Value>> {
-                let bin =
-                    |ring: usize, cone: usize| ledgers.fraction(LEDGER_BINS + (side * rings + ring) * cones + cone);
+                let bin = |ring: usize, cone: usize| {
+                    ledgers.fraction(LedgerEntry::LENGTH + (side * rings + ring) * cones + cone)
+                };
                 (0..rings).map(|ring| (0..cones).map(|cone| bin(ring, cone)).collect()).collect()
             };
             result["exit_histogram"] = json!({"radius_edges_mm": histogram.radius_edges_mm, "angle_edges_deg": histogram.angle_edges_deg,
@@ -119,6 +121,20 @@ impl Simulation {
             "collisions at which the majorant was below the extinction; weights make up for it, at a cost in noise"
         } else {
             "collisions at which the majorant was below the extinction: the result is biased"
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fractions_are_the_first_entries_of_the_ledger() {
+        let names: Vec<String> = FRACTIONS.iter().map(|name| name.to_uppercase()).collect();
+        let text = LedgerEntry::opencl_text();
+        for (name, number) in names.iter().zip(0..) {
+            assert!(text.contains(&format!("#define LEDGER_{name} {number}\n")), "{name} in {text}");
         }
     }
 }

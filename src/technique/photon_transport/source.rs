@@ -5,6 +5,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::PhotonTransport;
+use super::device::SourceKind;
 use crate::error::{Error, Result};
 
 /// The light. `position_mm` counts from the box's corner. What starts outside the box flies to it and enters there.
@@ -39,8 +40,8 @@ pub struct LightSource {
 /// A source in numbers.
 #[derive(Debug, Clone)]
 pub struct Source {
-    /// Its number in `kernels/shared/photon.h`.
-    pub kind: i32,
+    /// Its kind.
+    pub kind: SourceKind,
     /// Where, from the box's corner.
     pub position_mm: DVec3,
     /// Whither, of unit length.
@@ -50,7 +51,19 @@ pub struct Source {
     cos_from: f64,
 }
 
-const KINDS: [&str; 6] = ["pencil", "isotropic", "planar", "disk", "cone", "diffuse"];
+impl SourceKind {
+    /// The kind of a name in requests; a pencil where there is none of that name.
+    fn named(name: &str) -> Self {
+        match name {
+            "isotropic" => Self::Isotropic,
+            "planar" => Self::Planar,
+            "disk" => Self::Disk,
+            "cone" => Self::Cone,
+            "diffuse" => Self::Diffuse,
+            _ => Self::Pencil,
+        }
+    }
+}
 
 impl LightSource {
     /// Energy of its gamma photons.
@@ -65,7 +78,6 @@ impl LightSource {
     pub fn resolve(&self, size_mm: [f64; 3], chamber: bool, at: &str) -> Result<Source> {
         let size = DVec3::from(size_mm);
         let name = self.kind.as_deref().unwrap_or(if chamber { "isotropic" } else { "pencil" });
-        let kind = KINDS.iter().position(|k| *k == name).unwrap_or(0);
         let (place, way) = if chamber {
             (DVec3::new(0.5, 0.9, 0.5) * size, DVec3::NEG_Y)
         } else {
@@ -91,8 +103,14 @@ impl LightSource {
         let (b1, b2) = axis.any_orthonormal_pair();
         let (u_mm, v_mm) = if planar { (u, v) } else { (radius * b1, radius * b2) };
         let half_angle = if name == "cone" { self.half_angle_deg.unwrap_or(20.0) } else { 180.0 };
-        let source =
-            Source { kind: kind as i32, position_mm, axis, u_mm, v_mm, cos_from: half_angle.to_radians().cos() };
+        let source = Source {
+            kind: SourceKind::named(name),
+            position_mm,
+            axis,
+            u_mm,
+            v_mm,
+            cos_from: half_angle.to_radians().cos(),
+        };
         if ["pencil", "planar", "disk"].contains(&name) && !source.meets(size) {
             return Err(Error::invalid(at, "the beam misses the box", "a position and direction that meet it"));
         }
@@ -103,7 +121,7 @@ impl LightSource {
 impl Source {
     /// Whether any of its parallel rays meets the box.
     fn meets(&self, size: DVec3) -> bool {
-        let planar = self.kind == 2;
+        let planar = self.kind == SourceKind::Planar;
         let places = (-8..=8).flat_map(|i| (-8..=8).map(move |k| (f64::from(i) / 8.0, f64::from(k) / 8.0)));
         places.filter(|(a, b)| planar || a.hypot(*b) <= 1.0).any(|(a, b)| {
             let (a, b) = if planar { (0.5 * a + 0.5, 0.5 * b + 0.5) } else { (a, b) };
@@ -126,7 +144,7 @@ impl Source {
     /// Writes what the kernel needs.
     pub fn apply(&self, device: &mut PhotonTransport) {
         let floats = |v: DVec3| v.as_vec3().to_array();
-        device.source_type = self.kind;
+        device.source_type = self.kind.code();
         (device.source, device.source_axis) = (floats(self.position_mm), floats(self.axis));
         (device.source_u, device.source_v) = (floats(self.u_mm), floats(self.v_mm));
         device.source_cos_from = self.cos_from as f32;

@@ -3,26 +3,7 @@
 use super::geometry::Geometry;
 use super::parameters::Parameters;
 use crate::error::{Error, Result};
-
-/// A tracker of `kernels/shared/medium.h`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Tracking {
-    /// Closed form in a piece, from wall to wall.
-    Exact,
-    /// Steps of one length.
-    March,
-    /// Woodcock's, with majorants.
-    Delta,
-    /// The same with weights, for majorants that may be too small.
-    Weighted,
-}
-
-impl Tracking {
-    /// Its name in requests and replies.
-    pub fn name(self) -> &'static str {
-        ["exact", "march", "delta", "weighted"][self as usize]
-    }
-}
+pub use crate::technique::majorant::Tracking;
 
 /// The tracker of a request, with the reason in words.
 ///

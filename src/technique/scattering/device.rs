@@ -1,6 +1,16 @@
 //! What the kernels of scattering views are told.
 
-use crate::device_struct;
+use crate::{device_enum, device_struct};
+
+device_enum! {
+    /// How the density of the medium lies in the volume.
+    pub enum Density: "DENSITY" {
+        /// It is the same everywhere.
+        Constant,
+        /// It is interpolated between voxels.
+        Grid,
+    }
+}
 
 device_struct! {
     /// Their own parameters. Places are in index units, lengths in world units; `at_` says where in the table something starts.

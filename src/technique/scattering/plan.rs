@@ -2,40 +2,41 @@
 
 use serde_json::{Value, json};
 
-use super::device::Scattering;
-use super::parameters::{Parameters, Tracking};
+use super::device::{Density, Scattering};
+use super::parameters::{Parameters, Tracking as Asked};
 use crate::device::cells::CELL;
+use crate::device::enums::{DeviceEnum, LightKind, PhaseKind};
 use crate::device::program::{Source, Variant, listed};
-use crate::device::structs::{DeviceStruct, View as DeviceView};
+use crate::device::structs::DeviceStruct;
 use crate::error::{Error, Result};
 use crate::scene;
 use crate::scene::camera::{Camera, Framing};
 use crate::scene::depth::greatest_along_axes;
 use crate::scene::interpolation::Interpolation;
 use crate::scene::lights::Lights;
-use crate::technique::majorant::march_bias;
+use crate::technique::majorant::{Tracking, march_bias};
 use crate::technique::slab::missing;
-use crate::technique::{CellUse, Random, View, ViewPlan};
+use crate::technique::{CellUse, Random, View, ViewPlan, view_text};
 use crate::volume::{Volume, VoxelType};
 
 type Features = [(&'static str, i32); 3];
 
-const fn of(geometry: i32, tracking: i32, interpolation: Interpolation) -> Features {
-    [("GEOMETRY", geometry), ("TRACKING", tracking), ("INTERPOLATION", interpolation.code())]
+const fn of(density: Density, tracking: Tracking, interpolation: Interpolation) -> Features {
+    [("DENSITY", density.code()), ("TRACKING", tracking.code()), ("INTERPOLATION", interpolation.code())]
 }
 
 /// Every set of features that may be built: the box, whose density is the same everywhere, and each tracker through a grid.
 static FEATURES: [Features; 8] = {
     use Interpolation::{Nearest, Trilinear};
     [
-        of(1, 2, Trilinear),
-        of(0, 0, Nearest),
-        of(1, 2, Nearest),
-        of(1, 0, Nearest),
-        of(1, 1, Trilinear),
-        of(1, 1, Nearest),
-        of(1, 3, Trilinear),
-        of(1, 3, Nearest),
+        of(Density::Grid, Tracking::Delta, Trilinear),
+        of(Density::Constant, Tracking::Exact, Nearest),
+        of(Density::Grid, Tracking::Delta, Nearest),
+        of(Density::Grid, Tracking::Exact, Nearest),
+        of(Density::Grid, Tracking::March, Trilinear),
+        of(Density::Grid, Tracking::March, Nearest),
+        of(Density::Grid, Tracking::Weighted, Trilinear),
+        of(Density::Grid, Tracking::Weighted, Nearest),
     ]
 };
 
@@ -49,8 +50,10 @@ pub(in crate::technique) fn source(kernel: &'static str) -> Source {
         kernel,
         structs: || {
             "#pragma OPENCL EXTENSION cl_khr_int64_base_atomics : enable\n".to_owned()
-                + &DeviceView::opencl_text()
+                + &view_text()
                 + &Scattering::opencl_text()
+                + &[Density::opencl_text(), Tracking::opencl_text()].concat()
+                + &[PhaseKind::opencl_text(), LightKind::opencl_text()].concat()
         },
         variants: match kernel {
             "single_scatter" => || variants("single_scatter"),
@@ -122,16 +125,21 @@ impl Scatterer {
 
     fn features(&self, volume: &Volume) -> Result<(&'static Features, String)> {
         let (p, interpolation) = (&self.parameters, self.parameters.interpolation());
-        let any = matches!(p.tracking, Tracking::Auto | Tracking::Exact);
+        let any = matches!(p.tracking, Asked::Auto | Asked::Exact);
         let (wanted, why) = match p.tracking {
-            _ if any && Self::is_box(volume) => {
-                (of(0, 0, Interpolation::Nearest), "exact: from face to face a free path is a closed form")
+            _ if any && Self::is_box(volume) => (
+                of(Density::Constant, Tracking::Exact, Interpolation::Nearest),
+                "exact: from face to face a free path is a closed form",
+            ),
+            Asked::Auto => {
+                (of(Density::Grid, Tracking::Delta, interpolation), "delta: with the majorants of macro-cells")
             }
-            Tracking::Auto => (of(1, 2, interpolation), "delta: with the majorants of macro-cells"),
-            Tracking::Exact => (of(1, 0, interpolation), "exact, as asked"),
-            Tracking::March => (of(1, 1, interpolation), "march, as asked: biased by up to a step a path"),
-            Tracking::Delta => (of(1, 2, interpolation), "delta, as asked"),
-            Tracking::Weighted => (of(1, 3, interpolation), "weighted, as asked"),
+            Asked::Exact => (of(Density::Grid, Tracking::Exact, interpolation), "exact, as asked"),
+            Asked::March => {
+                (of(Density::Grid, Tracking::March, interpolation), "march, as asked: biased by up to a step a path")
+            }
+            Asked::Delta => (of(Density::Grid, Tracking::Delta, interpolation), "delta, as asked"),
+            Asked::Weighted => (of(Density::Grid, Tracking::Weighted, interpolation), "weighted, as asked"),
         };
         Ok((listed(self.kernel, &FEATURES, wanted)?, format!("tracking {why}")))
     }
@@ -141,7 +149,7 @@ impl Scatterer {
         let largest = volume.spacing().into_iter().fold(0.0, f64::max);
         let most = volume.dims().into_iter().max().unwrap_or(1) as f64;
         let least = most * LOST * largest / Self::smallest_voxel(volume);
-        if self.parameters.tracking != Tracking::March || self.parameters.march_step_voxels >= least {
+        if self.parameters.tracking != Asked::March || self.parameters.march_step_voxels >= least {
             return Ok(());
         }
         let at = format!("/{}/march_step_voxels", self.kernel);
@@ -166,13 +174,15 @@ impl Scatterer {
 
     /// Walls, and what a free path is drawn with between them.
     fn walls(&self, volume: &Volume, features: &Features, greatest_sigma: f64, device: &mut Scattering) {
-        let (geometry, tracking) = (features[0].1, features[1].1);
+        let is = |feature: (&'static str, i32)| features.contains(&feature);
         let p = &self.parameters;
-        let local = geometry == 1 && tracking >= 2 && p.majorant.grid == "local";
-        let side = match (geometry, tracking) {
-            (1, 0) => Some(1),
-            _ if local => Some(CELL),
-            _ => None,
+        let grid = is(("DENSITY", Density::Grid.code()));
+        let by_majorants = [Tracking::Delta, Tracking::Weighted].iter().any(|t| is(("TRACKING", t.code())));
+        let local = grid && by_majorants && p.majorant.grid == "local";
+        let side = match grid && is(("TRACKING", Tracking::Exact.code())) {
+            true => Some(1),
+            false if local => Some(CELL),
+            false => None,
         };
         for a in 0..3 {
             let n = volume.dims()[a];
@@ -180,7 +190,7 @@ impl Scatterer {
             device.wall_voxels[a] = side.unwrap_or(n) as f32;
             device.walls_per_voxel[a] = if device.walls[a] > 1 { 1.0 / device.wall_voxels[a] } else { 0.0 };
         }
-        let scale = if geometry == 0 { 1.0 } else { p.majorant.scale };
+        let scale = if grid { p.majorant.scale } else { 1.0 };
         device.whole = i32::from(!local);
         let density = if local { 1.0 } else { p.medium.greatest_density(volume) };
         device.majorant = (greatest_sigma * scale * density) as f32;
@@ -280,11 +290,11 @@ impl View for Scatterer {
         if self.parameters.medium.density_window.is_none() && least < 0.0 {
             warn("negative_density", "values below 0 are rendered as empty; give medium a density_window", least, 0.0);
         }
-        let tracked = matches!(self.parameters.tracking, Tracking::Delta | Tracking::Auto);
+        let tracked = matches!(self.parameters.tracking, Asked::Delta | Asked::Auto);
         if tracked && self.parameters.majorant.scale < 1.0 && !Self::is_box(volume) {
             warn("broken_majorant", "majorants are below the extinction: biased", self.parameters.majorant.scale, 1.0);
         }
-        if self.parameters.tracking == Tracking::March {
+        if self.parameters.tracking == Asked::March {
             let depth = self.parameters.march_step_voxels * Self::smallest_voxel(volume);
             let sigma = self.parameters.medium.sigma_t_per_unit(volume).into_iter().fold(0.0, f64::max);
             let h = depth * sigma * self.parameters.medium.greatest_density(volume);
@@ -303,12 +313,37 @@ impl View for Scatterer {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::lights::LightSource;
+    use crate::scene::phase::Phase;
 
     #[test]
     fn features_that_are_not_listed_are_an_error_that_names_them() {
-        assert!(listed("volume_path", &FEATURES, of(1, 1, Interpolation::Nearest)).is_ok());
-        let said =
-            listed("volume_path", &FEATURES, of(0, 1, Interpolation::Nearest)).expect_err("not listed").to_string();
-        assert!(said.contains("volume_path GEOMETRY=0 TRACKING=1 INTERPOLATION=0"), "{said}");
+        assert!(listed("volume_path", &FEATURES, of(Density::Grid, Tracking::March, Interpolation::Nearest)).is_ok());
+        let said = listed("volume_path", &FEATURES, of(Density::Constant, Tracking::March, Interpolation::Nearest))
+            .expect_err("not listed")
+            .to_string();
+        assert!(said.contains("volume_path DENSITY=0 TRACKING=1 INTERPOLATION=0"), "{said}");
+    }
+
+    /// The scene numbers kinds by itself; the kernels know the enums' numbers.
+    #[test]
+    fn kinds_of_lights_and_phases_are_the_devices() {
+        let lights = json!([{"type": "sun"}, {"type": "point", "position": [0, 0, 1]},
+            {"type": "sphere", "position": [0, 0, 1], "radius": 1},
+            {"type": "quad", "corner": [0, 0, 0], "edge_u": [1, 0, 0], "edge_v": [0, 1, 0]}]);
+        let request: Vec<LightSource> = serde_json::from_value(lights).expect("lights");
+        let table = Lights::from_request(Some(&request), "").expect("lights").table(1.0, glam::DVec3::Y);
+        let kinds: Vec<i32> = table.chunks(scene::lights::LIGHT_NUMBERS).map(|light| light[0] as i32).collect();
+        assert_eq!(kinds, LightKind::ALL.iter().map(|kind| kind.code()).collect::<Vec<_>>());
+        for (value, kind) in [
+            (json!({"type": "isotropic"}), PhaseKind::Lobes),
+            (json!({"type": "henyey_greenstein"}), PhaseKind::Lobes),
+            (json!({"type": "two_term_henyey_greenstein"}), PhaseKind::Lobes),
+            (json!({"type": "rayleigh"}), PhaseKind::Rayleigh),
+            (json!({"type": "tabulated", "cosines": [-1, 1], "densities": [1, 1]}), PhaseKind::Table),
+        ] {
+            let phase: Phase = serde_json::from_value(value).expect("a phase function");
+            assert_eq!(phase.numbers(&mut Vec::new(), 0)[0] as i32, kind.code(), "{}", phase.kind);
+        }
     }
 }
