@@ -1,6 +1,7 @@
 //! What `single_scatter` and `volume_path` share: their parameters, and the plan made of them.
 
 mod device;
+mod kernels;
 mod parameters;
 mod plan;
 
@@ -8,8 +9,9 @@ use serde_json::Value;
 
 use crate::request;
 pub use device::Scattering;
+pub(super) use kernels::source;
 pub(super) use parameters::Parameters;
-pub(super) use plan::{Scatterer, source};
+pub(super) use plan::Scatterer;
 
 /// The schema of the parameters without those that are not a technique's own, and without phase functions that are not of light.
 pub(super) fn schema(without: &[&str]) -> &'static Value {

@@ -24,6 +24,8 @@
 //!
 //! Example: see [`example`], which a test runs.
 
+mod plan;
+
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -31,16 +33,12 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::{CellUse, Kind, Technique, View, ViewPlan, view_text};
-use crate::device::program::{Source, Variant, listed};
-use crate::device::structs::{DeviceStruct, View as DeviceView};
+use super::{Kind, Technique, View};
 use crate::device_struct;
 use crate::error::{Error, Result};
 use crate::request;
-use crate::scene::camera::Camera;
 use crate::scene::interpolation::Interpolation;
-use crate::scene::window::{ColorMap, Output, Window, WindowRequest};
-use crate::volume::{Volume, VoxelType};
+use crate::scene::window::{ColorMap, Output, WindowRequest};
 
 /// The technique's line in the list.
 pub const TECHNIQUE: Technique = Technique {
@@ -48,7 +46,7 @@ pub const TECHNIQUE: Technique = Technique {
     summary: "An oblique plane through the volume, or the greatest, least or mean value of a slab around it",
     schema: request::schema_of::<Parameters>,
     example,
-    source,
+    source: plan::source,
     kind: Kind::View(parse),
 };
 
@@ -153,36 +151,6 @@ pub fn example() -> Value {
     })
 }
 
-type Features = [(&'static str, i32); 1];
-
-/// Every interpolation may be built; the first before the service is ready.
-static FEATURES: [Features; 4] = {
-    use Interpolation::{BSpline, CatmullRom, Nearest, Trilinear};
-    [
-        [("INTERPOLATION", Trilinear.code())],
-        [("INTERPOLATION", Nearest.code())],
-        [("INTERPOLATION", BSpline.code())],
-        [("INTERPOLATION", CatmullRom.code())],
-    ]
-};
-
-fn permitted(wanted: Features) -> Result<&'static Features> {
-    listed(TECHNIQUE.name, &FEATURES, wanted)
-}
-
-fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
-    Variant::new(TECHNIQUE.name, Some(voxel), features)
-}
-
-fn source() -> Source {
-    Source {
-        kernel: TECHNIQUE.name,
-        structs: || view_text() + &Slice::opencl_text(),
-        variants: || FEATURES.iter().flat_map(|f| VoxelType::ALL.map(|t| variant(t, f))).collect(),
-        common: VoxelType::ALL.len(),
-    }
-}
-
 fn parse(parameters: &Value, at: &str) -> Result<Arc<dyn View>> {
     let parameters: Parameters = request::parse(parameters, (TECHNIQUE.schema)(), at)?;
     if let Some(window) = &parameters.window {
@@ -218,85 +186,5 @@ impl Plane {
             }
         }
         Ok(())
-    }
-
-    /// A point of the plane and its unit normal, in the world.
-    fn resolve(&self, volume: &Volume, camera: &Camera) -> (DVec3, DVec3) {
-        let axis = match self.axis.as_deref() {
-            Some("x") => DVec3::X,
-            Some("y") => DVec3::Y,
-            Some(_) => DVec3::Z,
-            None => {
-                let normal = self.normal.map(DVec3::from).and_then(DVec3::try_normalize);
-                return (self.point.map_or(DVec3::ZERO, DVec3::from), normal.unwrap_or(camera.towards_eye()));
-            }
-        };
-        let extent = volume.world_half_size().dot(axis);
-        let place = self.fraction.map_or(self.position.unwrap_or(0.0), |f| (2.0 * f - 1.0) * extent);
-        (axis * place, axis)
-    }
-}
-
-impl Parameters {
-    fn window(&self, volume: &Volume) -> Result<Window> {
-        self.window.as_ref().map_or_else(|| Ok(Window::range(volume)), |w| w.check("/slice/window"))
-    }
-}
-
-impl View for Parameters {
-    fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
-        let wanted = [("INTERPOLATION", self.interpolation.unwrap_or(Interpolation::Trilinear).code())];
-        let features = permitted(wanted)?;
-        let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
-        Ok(ViewPlan {
-            variant: variant(volume.voxel_type(), features),
-            cells: CellUse::None,
-            step: smallest as f32,
-            stepless: true,
-            opacity_threshold: 1.0,
-            reasons: vec![format!("window: {}", self.window(volume)?)],
-        })
-    }
-
-    fn parameters(&self, volume: &Volume, camera: &Camera) -> Result<Vec<u8>> {
-        let (point, normal) = self.plane.resolve(volume, camera);
-        let world_from_index = volume.world_from_index();
-        let [a, b, c] = (world_from_index.matrix3.transpose() * normal).to_array();
-        let d = normal.dot(world_from_index.translation - point);
-        let [window_scale, window_offset] = self.window(volume)?.scale_and_offset();
-        let wanted = if self.mode == Mode::Minimum { -1.0 } else { 1.0 };
-        let device = Slice {
-            plane_index: [a, b, c, d].map(|v| v as f32),
-            normal_index: volume.index_from_world().transform_vector3(normal).as_vec3().to_array(),
-            half_thickness: (0.5 * self.thickness) as f32,
-            peaks: i32::from(self.mode != Mode::Mean),
-            sign: (wanted * volume.slope().signum()) as f32,
-            slope: volume.slope() as f32,
-            inter: volume.inter() as f32,
-            window_scale,
-            window_offset,
-            raw_values: i32::from(self.output == Output::Value),
-        };
-        Ok(bytemuck::bytes_of(&device).to_vec())
-    }
-
-    fn table(&self, _volume: &Volume, _step: f32) -> Result<Vec<u32>> {
-        Ok(self.color_map.table(self.invert))
-    }
-
-    fn look(&self, _camera: &Camera, view: &mut DeviceView) {
-        view.jittered = 0;
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn features_that_are_not_listed_are_an_error_that_names_them() {
-        assert!(permitted([("INTERPOLATION", Interpolation::BSpline.code())]).is_ok());
-        let said = permitted([("INTERPOLATION", 7)]).expect_err("not listed").to_string();
-        assert!(said.contains("slice INTERPOLATION=7"), "{said}");
     }
 }

@@ -3,11 +3,10 @@
 use serde_json::{Value, json};
 
 use super::device::{Density, Scattering};
+use super::kernels::{Features, of, permitted};
 use super::parameters::{Parameters, Tracking as Asked};
 use crate::device::cells::CELL;
-use crate::device::enums::{DeviceEnum, LightKind, PhaseKind};
-use crate::device::program::{Source, Variant, listed};
-use crate::device::structs::DeviceStruct;
+use crate::device::program::Variant;
 use crate::error::{Error, Result};
 use crate::scene;
 use crate::scene::camera::{Camera, Framing};
@@ -16,63 +15,16 @@ use crate::scene::interpolation::Interpolation;
 use crate::scene::lights::Lights;
 use crate::technique::majorant::{Tracking, march_bias};
 use crate::technique::slab::missing;
-use crate::technique::{CellUse, Random, View, ViewPlan, view_text};
-use crate::volume::{Volume, VoxelType};
-
-type Features = [(&'static str, i32); 3];
-
-const fn of(density: Density, tracking: Tracking, interpolation: Interpolation) -> Features {
-    [("DENSITY", density.code()), ("TRACKING", tracking.code()), ("INTERPOLATION", interpolation.code())]
-}
-
-/// Every set of features that may be built: the box, whose density is the same everywhere, and each tracker through a grid.
-static FEATURES: [Features; 8] = {
-    use Interpolation::{Nearest, Trilinear};
-    [
-        of(Density::Grid, Tracking::Delta, Trilinear),
-        of(Density::Constant, Tracking::Exact, Nearest),
-        of(Density::Grid, Tracking::Delta, Nearest),
-        of(Density::Grid, Tracking::Exact, Nearest),
-        of(Density::Grid, Tracking::March, Trilinear),
-        of(Density::Grid, Tracking::March, Nearest),
-        of(Density::Grid, Tracking::Weighted, Trilinear),
-        of(Density::Grid, Tracking::Weighted, Nearest),
-    ]
-};
+use crate::technique::{CellUse, Random, View, ViewPlan};
+use crate::volume::Volume;
 
 /// Steps of less than this part of a volume's voxels along an axis are lost in single precision.
 const LOST: f64 = 1.0 / (1u64 << 20) as f64;
 /// Voxels that the mean density is taken of.
 const MEAN_OF: usize = 4096;
 
-pub(in crate::technique) fn source(kernel: &'static str) -> Source {
-    Source {
-        kernel,
-        structs: || {
-            "#pragma OPENCL EXTENSION cl_khr_int64_base_atomics : enable\n".to_owned()
-                + &view_text()
-                + &Scattering::opencl_text()
-                + &[Density::opencl_text(), Tracking::opencl_text()].concat()
-                + &[PhaseKind::opencl_text(), LightKind::opencl_text()].concat()
-        },
-        variants: match kernel {
-            "single_scatter" => || variants("single_scatter"),
-            _ => || variants("volume_path"),
-        },
-        common: 1,
-    }
-}
-
 /// The part of the scattered light that a picture may lack without a word.
 const SCATTERINGS_MISSING: f64 = 0.01;
-
-/// The first is a built-in's.
-fn variants(kernel: &'static str) -> Vec<Variant> {
-    let mut types = VoxelType::ALL;
-    types.reverse();
-    let of = |features: &'static Features| types.map(|t| Variant::new(kernel, Some(t), features));
-    FEATURES.iter().flat_map(of).collect()
-}
 
 /// A scattering view with valid parameters.
 pub(in crate::technique) struct Scatterer {
@@ -141,7 +93,7 @@ impl Scatterer {
             Asked::Delta => (of(Density::Grid, Tracking::Delta, interpolation), "delta, as asked"),
             Asked::Weighted => (of(Density::Grid, Tracking::Weighted, interpolation), "weighted, as asked"),
         };
-        Ok((listed(self.kernel, &FEATURES, wanted)?, format!("tracking {why}")))
+        Ok((permitted(self.kernel, wanted)?, format!("tracking {why}")))
     }
 
     /// A march whose step is lost in the rounding of places along some axis would never end.
@@ -307,43 +259,5 @@ impl View for Scatterer {
             warn("multiple_scattering_missing", message, missing, SCATTERINGS_MISSING);
         }
         warnings
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::lights::LightSource;
-    use crate::scene::phase::Phase;
-
-    #[test]
-    fn features_that_are_not_listed_are_an_error_that_names_them() {
-        assert!(listed("volume_path", &FEATURES, of(Density::Grid, Tracking::March, Interpolation::Nearest)).is_ok());
-        let said = listed("volume_path", &FEATURES, of(Density::Constant, Tracking::March, Interpolation::Nearest))
-            .expect_err("not listed")
-            .to_string();
-        assert!(said.contains("volume_path DENSITY=0 TRACKING=1 INTERPOLATION=0"), "{said}");
-    }
-
-    /// The scene numbers kinds by itself; the kernels know the enums' numbers.
-    #[test]
-    fn kinds_of_lights_and_phases_are_the_devices() {
-        let lights = json!([{"type": "sun"}, {"type": "point", "position": [0, 0, 1]},
-            {"type": "sphere", "position": [0, 0, 1], "radius": 1},
-            {"type": "quad", "corner": [0, 0, 0], "edge_u": [1, 0, 0], "edge_v": [0, 1, 0]}]);
-        let request: Vec<LightSource> = serde_json::from_value(lights).expect("lights");
-        let table = Lights::from_request(Some(&request), "").expect("lights").table(1.0, glam::DVec3::Y);
-        let kinds: Vec<i32> = table.chunks(scene::lights::LIGHT_NUMBERS).map(|light| light[0] as i32).collect();
-        assert_eq!(kinds, LightKind::ALL.iter().map(|kind| kind.code()).collect::<Vec<_>>());
-        for (value, kind) in [
-            (json!({"type": "isotropic"}), PhaseKind::Lobes),
-            (json!({"type": "henyey_greenstein"}), PhaseKind::Lobes),
-            (json!({"type": "two_term_henyey_greenstein"}), PhaseKind::Lobes),
-            (json!({"type": "rayleigh"}), PhaseKind::Rayleigh),
-            (json!({"type": "tabulated", "cosines": [-1, 1], "densities": [1, 1]}), PhaseKind::Table),
-        ] {
-            let phase: Phase = serde_json::from_value(value).expect("a phase function");
-            assert_eq!(phase.numbers(&mut Vec::new(), 0)[0] as i32, kind.code(), "{}", phase.kind);
-        }
     }
 }

@@ -1,0 +1,177 @@
+//! What `projection` has the device run.
+
+use serde_json::Value;
+
+use super::{DeviceMode, Mode, Parameters, Projection, TECHNIQUE};
+use crate::device::enums::DeviceEnum;
+use crate::device::program::{Source, Variant, listed};
+use crate::device::structs::{DeviceStruct, View as DeviceView};
+use crate::error::Result;
+use crate::scene;
+use crate::scene::camera::Camera;
+use crate::scene::interpolation::Interpolation;
+use crate::scene::presets::is_hounsfield;
+use crate::scene::window::{Output, Window};
+use crate::technique::steps::coarse_step;
+use crate::technique::{CellUse, View, ViewPlan, view_text};
+use crate::volume::{Volume, VoxelType};
+
+/// The optical depth of a bright ray in an X-ray by default: an eighth gets through.
+const XRAY_OPTICAL_DEPTH: f64 = 2.0;
+
+type Features = [(&'static str, i32); 2];
+
+const fn features(interpolation: Interpolation, walked: bool) -> Features {
+    [("INTERPOLATION", interpolation.code()), ("WALKED", walked as i32)]
+}
+
+/// Every set of features that may be built; the first two are built before the service is ready.
+static FEATURES: [Features; 8] = {
+    use Interpolation::{BSpline, CatmullRom, Nearest, Trilinear};
+    [
+        features(Trilinear, false),
+        features(Trilinear, true),
+        features(Nearest, false),
+        features(Nearest, true),
+        features(BSpline, false),
+        features(BSpline, true),
+        features(CatmullRom, false),
+        features(CatmullRom, true),
+    ]
+};
+
+fn permitted(wanted: Features) -> Result<&'static Features> {
+    listed(TECHNIQUE.name, &FEATURES, wanted)
+}
+
+fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
+    Variant::new(TECHNIQUE.name, Some(voxel), features)
+}
+
+pub(super) fn source() -> Source {
+    Source {
+        kernel: TECHNIQUE.name,
+        structs: || view_text() + &Projection::opencl_text() + &DeviceMode::opencl_text(),
+        variants: || FEATURES.iter().flat_map(|f| VoxelType::ALL.map(|t| variant(t, f))).collect(),
+        common: 2 * VoxelType::ALL.len(),
+    }
+}
+
+impl Parameters {
+    pub(super) fn peaks(&self) -> bool {
+        matches!(self.mode, Mode::Maximum | Mode::Minimum)
+    }
+
+    fn interpolation(&self) -> Interpolation {
+        self.interpolation.unwrap_or(Interpolation::Trilinear)
+    }
+
+    pub(super) fn is_spline(&self) -> bool {
+        matches!(self.interpolation(), Interpolation::BSpline | Interpolation::CatmullRom)
+    }
+
+    fn walked(&self) -> bool {
+        !self.peaks() || self.exact.unwrap_or(self.interpolation() == Interpolation::Nearest)
+    }
+
+    fn zero_value(&self, volume: &Volume) -> f64 {
+        let suits = if is_hounsfield(volume.range()) { -1000.0 } else { volume.range()[0].min(0.0) };
+        self.zero_value.unwrap_or(suits)
+    }
+
+    fn sigma_per_value(&self, volume: &Volume) -> f64 {
+        self.sigma_per_value.unwrap_or_else(|| {
+            let mean = (volume.bright_mean() - self.zero_value(volume)).abs();
+            let mean = if mean > 0.0 { mean } else { 1.0 };
+            XRAY_OPTICAL_DEPTH / (mean * scene::mean_side(volume))
+        })
+    }
+
+    fn window(&self, volume: &Volume) -> Result<Window> {
+        if let Some(window) = &self.window {
+            return window.check("/projection/window");
+        }
+        let (low, side) = (volume.range()[0], scene::mean_side(volume));
+        Ok(match self.mode {
+            Mode::Maximum | Mode::Minimum => Window::range(volume),
+            Mode::Mean => Window::of(low, volume.bright_mean()),
+            Mode::Sum => Window::of(low.min(0.0) * side, volume.bright_mean().max(0.0) * side),
+            Mode::Xray => Window::of(0.0, 1.0),
+        })
+    }
+}
+
+impl View for Parameters {
+    fn warnings(&self, _: &Volume) -> Vec<Value> {
+        coarse_step(self.step_voxels).filter(|_| !self.walked()).into_iter().collect()
+    }
+
+    /// Half an entry of the table of colours, where samples are taken and not written to the film as they are.
+    fn resolution(&self, volume: &Volume) -> Result<Option<f64>> {
+        let plain = !self.walked() && self.interpolation() == Interpolation::Trilinear && self.output != Output::Value;
+        let [per_value, _] = self.window(volume)?.scale_and_offset();
+        Ok(plain.then(|| 0.5 / f64::from(per_value).abs()))
+    }
+
+    fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
+        let wanted = features(self.interpolation(), self.walked());
+        let features = permitted(wanted)?;
+        let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
+        let mut reasons = vec![format!("window: {}", self.window(volume)?)];
+        reasons.push(match (self.walked(), self.empty_space_skipping) {
+            (true, _) => "exact for the interpolant: the step plays no part".into(),
+            (_, true) => "what cannot show more than was seen is left out".into(),
+            (_, false) => "every sample is taken: skipping is off".into(),
+        });
+        if self.mode == Mode::Xray {
+            let (sigma, zero) = (self.sigma_per_value(volume), self.zero_value(volume));
+            reasons.push(format!("extinction {sigma:.4e} per unit and value above {zero}"));
+        }
+        Ok(ViewPlan {
+            variant: variant(volume.voxel_type(), features),
+            cells: CellUse::Ranges,
+            step: (if self.walked() { 1.0 } else { self.step_voxels } * smallest) as f32,
+            stepless: self.walked(),
+            opacity_threshold: 1.0,
+            reasons,
+        })
+    }
+
+    fn parameters(&self, volume: &Volume, _camera: &Camera) -> Result<Vec<u8>> {
+        let [window_scale, window_offset] = self.window(volume)?.scale_and_offset();
+        let wanted = if self.mode == Mode::Minimum { -1.0 } else { 1.0 };
+        let device = Projection {
+            mode: self.mode.on_device().code(),
+            sign: (wanted * volume.slope().signum()) as f32,
+            slope: volume.slope() as f32,
+            inter: volume.inter() as f32,
+            sigma_per_value: self.sigma_per_value(volume) as f32,
+            zero_value: self.zero_value(volume) as f32,
+            window_scale,
+            window_offset,
+            raw_values: i32::from(self.output == Output::Value),
+            skipping: i32::from(self.empty_space_skipping),
+        };
+        Ok(bytemuck::bytes_of(&device).to_vec())
+    }
+
+    fn table(&self, _volume: &Volume, _step: f32) -> Result<Vec<u32>> {
+        Ok(self.color_map.table(self.invert))
+    }
+
+    fn look(&self, _camera: &Camera, view: &mut DeviceView) {
+        view.jittered = 0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn features_that_are_not_listed_are_an_error_that_names_them() {
+        assert!(permitted(features(Interpolation::BSpline, true)).is_ok());
+        let said = permitted([("INTERPOLATION", 7), ("WALKED", 0)]).expect_err("not listed").to_string();
+        assert!(said.contains("projection INTERPOLATION=7 WALKED=0"), "{said}");
+    }
+}
