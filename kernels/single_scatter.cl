@@ -5,12 +5,15 @@
 // The free flight's density is known only on average, e = sigma exp(-sigma t); any weights that sum to 1 leave the mean as it is.
 // One work-item is a tile of ITEM x ITEM pixels; a lane that is through with its sample takes the next of them.
 
+#include "shared/camera_flight.h"
 #include "shared/flight.h"
 #include "shared/lanes.h"
 #include "shared/light.h"
+#include "shared/path_film.h"
 #include "shared/phase.h"
 #include "shared/rng.h"
 #include "shared/tile.h"
+#include "shared/tracker.h"
 
 // What a lane is at: 0 the way from the eye; 1 .. lights a light seen from the collision; then the sky; then for each light the way
 // from the eye to a place chosen by angle, and from there to the light.

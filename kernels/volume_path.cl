@@ -3,13 +3,16 @@
 // a direction of the phase function; what it meets there of the sky and of lights that have a size is weighed by the balance
 // heuristic. One work-item is a tile of ITEM x ITEM pixels; a lane whose path has ended takes the next of them.
 
+#include "shared/camera_flight.h"
 #include "shared/flight.h"
 #include "shared/lanes.h"
 #include "shared/light.h"
+#include "shared/path_film.h"
 #include "shared/phase.h"
 #include "shared/rng.h"
 #include "shared/surface.h"
 #include "shared/tile.h"
+#include "shared/tracker.h"
 
 typedef struct {
     Flight flight;

@@ -65,6 +65,19 @@ static inline UInt4Lanes draw_ahead(constant const FieldPass *pass, const Photon
     return numbers;
 }
 
+// Puts newly launched photons in the lanes of `fresh`.
+static inline void replace_photons(Photon *photon, const Photon *launched, Mask fresh) {
+    photon->p = select3(photon->p, launched->p, fresh), photon->d = select3(photon->d, launched->d, fresh);
+    photon->cell.x = select(photon->cell.x, launched->cell.x, fresh), photon->cell.y = select(photon->cell.y, launched->cell.y, fresh);
+    photon->cell.z = select(photon->cell.z, launched->cell.z, fresh);
+    photon->weight = select(photon->weight, launched->weight, fresh), photon->depth = select(photon->depth, launched->depth, fresh);
+    photon->optical = select(photon->optical, launched->optical, fresh), photon->path = select(photon->path, launched->path, fresh);
+    photon->energy = select(photon->energy, launched->energy, fresh);
+    photon->number = as_UInt(select(as_Int(photon->number), as_Int(launched->number), fresh));
+    photon->event = as_UInt(select(as_Int(photon->event), as_Int(launched->event), fresh));
+    photon->scatterings = select(photon->scatterings, launched->scatterings, fresh);
+}
+
 // Adds the paths of photons that have ended.
 static inline void gain_path(constant const PhotonTransport *params, const Photon *photon, Mask ended, Gains *gains) {
     Real path = select((Real)(0.0f), fmin(photon->path * params->paths_per_mm, (Real)(1e15f)), ended);

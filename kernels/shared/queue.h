@@ -1,0 +1,52 @@
+// Which photons a work-item launches, and when: a lane whose photon has ended takes the next one.
+#ifndef SHARED_QUEUE_H
+#define SHARED_QUEUE_H
+
+#include "shared/lanes.h"
+
+// The photons that a work-item has still to launch.
+typedef struct {
+    uint next, end; // the rest of its share
+    bool more;      // true while another share may be taken
+    long launched, passed; // photons so far, and steps of all lanes
+} Queue;
+
+// Where the share of photons ends that begins with that one.
+static inline uint share_end(constant const FieldPass *pass, uint first) { return first + min(pass->count - first, pass->per_item); }
+
+// A work-item has one share; with a grid of its own it takes one after the other until there are none.
+static inline Queue queue_of(constant const FieldPass *pass, uint item) {
+    Queue q;
+    q.next = pass->own_grids ? 0 : item * pass->per_item;
+    q.end = pass->own_grids ? 0 : share_end(pass, q.next);
+    q.more = pass->own_grids;
+    q.launched = q.passed = 0;
+    return q;
+}
+
+static inline void take_share(constant const FieldPass *pass, global ulong *ledger, Queue *q) {
+    q->next = min((uint)atom_add(&ledger[pass->taken_at], (ulong)pass->per_item), pass->count);
+    q->end = share_end(pass, q->next);
+    q->more = q->next < q->end;
+}
+
+// True if photons are to be launched into so many free lanes. A launch costs about a step of all lanes: if each fills f of them, and
+// photons live n steps, then LANES / (n f) of the time goes into launches and (f - 1) / (2 LANES) is lost to free lanes, the least
+// together where f^2 is 2 LANES^2 / n. So far n is LANES times the steps that have passed over the photons launched.
+static inline int is_launch_due(int free, const Queue *q) {
+    return free == LANES || free * free * q->passed >= 2 * LANES * q->launched;
+}
+
+// Gives each free lane the number of the next photon, in the lanes' order. Returns the lanes that have one.
+static inline Mask take_photons(Mask alive, Queue *q, UInt *number) {
+    IntLanes free, place;
+    free.v = ~alive;
+    int left = (int)(q->end - q->next), given = 0;
+    for (int i = 0; i < LANES; i++) place.lane[i] = given, given -= free.lane[i];
+    Mask fresh = ~alive & MASK(place.v < left);
+    *number = as_UInt(place.v) + q->next;
+    given = min(given, left), q->next += (uint)given, q->launched += given;
+    return fresh;
+}
+
+#endif
