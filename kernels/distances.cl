@@ -40,11 +40,11 @@ kernel void distances(constant CellsPass *pass, global const float *intervals, g
     }
     for (int i = 0; i < count; i++) {
         int best = from[start + i * stride];
-        for (int apart = 1; apart < best; apart++) {
-            int before = i - apart >= 0 ? from[start + (i - apart) * stride] : 255;
-            int after = i + apart < count ? from[start + (i + apart) * stride] : 255;
-            if (i - apart < 0 && i + apart >= count) break;
-            best = min(best, max(apart, min(before, after)));
+        for (int distance = 1; distance < best; distance++) {
+            int before = i - distance >= 0 ? from[start + (i - distance) * stride] : 255;
+            int after = i + distance < count ? from[start + (i + distance) * stride] : 255;
+            if (i - distance < 0 && i + distance >= count) break;
+            best = min(best, max(distance, min(before, after)));
         }
         to[start + i * stride] = (uchar)best;
     }

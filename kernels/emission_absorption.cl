@@ -14,7 +14,7 @@
 
 typedef struct { Real3 colour; Real transmittance; } Radiance;
 
-// The weight of what is behind all there is, in the lanes whose ray has not ended; what is behind that gets so much less.
+// The weight of a sample behind all that are there, in the lanes whose ray has not ended; it lowers the transmittance.
 static inline Real weight_of(constant const EmissionAbsorption *params, Real alpha, Radiance *r) {
     Real weight = select((Real)(0.0f), r->transmittance * alpha, MASK(r->transmittance > params->transmittance_floor));
     r->transmittance -= weight;
@@ -25,7 +25,7 @@ static inline void add_light(Real3 colour, Real weight, Radiance *r) {
     r->colour = real3(mad(colour.x, weight, r->colour.x), mad(colour.y, weight, r->colour.y), mad(colour.z, weight, r->colour.z));
 }
 
-// Puts a sample behind (or, back to front, before) what is there, in the lanes whose ray has not ended.
+// Puts a sample behind (or, back to front, before) those that are there, in the lanes whose ray has not ended.
 static inline void composite(constant const EmissionAbsorption *params, Optical o, Radiance *r) {
 #if BACK_TO_FRONT
     r->colour = add3(scale3(r->colour, 1.0f - o.alpha), scale3(o.colour, o.alpha));
@@ -86,15 +86,15 @@ static inline Real integral(global const uchar *table, int which, Real x) {
 // Rendering Using Hardware-Accelerated Pixel Shading", 2001), so the error falls with the square of the step. Values close
 // together take the integrand in their middle.
 static inline Real between(global const uchar *table, int which, Real a, Real b, Mask close) {
-    Real place = clamp(0.5f * (a + b) + 0.5f, (Real)(0.0f), (Real)(TABLE_SIZE - 1));
-    Real middle = gather_reals((global const float *)table + 4 + which, to_int(place) << 3);
+    Real position = clamp(0.5f * (a + b) + 0.5f, (Real)(0.0f), (Real)(TABLE_SIZE - 1));
+    Real middle = gather_reals((global const float *)table + 4 + which, to_int(position) << 3);
     if (!any_lane(~close)) return middle;
     Real mean = (integral(table, which, b) - integral(table, which, a)) / select(b - a, (Real)(1.0f), close);
     return select(mean, middle, close);
 }
 
-// The place of the value at t in the table, neither rounded nor clamped; NaN where the value is.
-static inline Real place_at(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels, const Packet *p,
+// The position of the value at t in the table, neither rounded nor clamped; NaN where the value is.
+static inline Real table_position_at(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels, const Packet *p,
                             Real t) {
     Real raw = sample_raw(view, voxels, along(p->ray.origin, p->ray.direction, t));
     return clamp(mad(raw, (Real)(params->table_scale), (Real)(params->table_offset - 0.5f)), (Real)(-1e7f), (Real)(1e7f)) + 0.0f * raw;
@@ -105,7 +105,7 @@ static inline void preintegrated_step(constant const View *view, constant const 
     Real from = fmax((Real)((float)k * view->step), p->ray.t_near), to = fmin((Real)((float)(k + 1) * view->step), p->ray.t_far);
     Mask inside = MASK(to > from);
     if (!any_lane(inside)) return;
-    Real a = place_at(view, params, voxels, p, from), b = place_at(view, params, voxels, p, to);
+    Real a = table_position_at(view, params, voxels, p, from), b = table_position_at(view, params, voxels, p, to);
     inside &= MASK(a == a) & MASK(b == b);
     a = select((Real)(0.0f), a, inside), b = select((Real)(0.0f), b, inside);
     Mask close = MASK(fabs(b - a) < 4.0f);
@@ -122,7 +122,7 @@ static inline void preintegrated_step(constant const View *view, constant const 
 }
 #endif
 
-// Whether samples are taken a stride at a time. Of lit ones that are far apart value and gradient come by the same gathers.
+// 1 if samples are taken a stride at a time. Lit samples that are far from each other share one gather for value and gradient.
 #if LANES == 1 || BACK_TO_FRONT || STYLED || PREINTEGRATED
 #define IN_STRIDES 0
 #elif !SHADED
@@ -137,20 +137,20 @@ static inline void preintegrated_step(constant const View *view, constant const 
 #endif
 
 #if IN_STRIDES
-// What is seen at the steps from k to end - 1, of which the places in the table are known. What is lit has a long way from its gradient
-// to its colour: the gradients come in a loop of their own, so that the processor has the light of several steps under way.
-static inline void see(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels, global const uchar *table,
-                       const Packet *p, int k, int end, Span span, int form, const Real *place, Radiance *r) {
+// Shades the steps from k to end - 1, whose positions in the table are known. A lit sample takes long from its gradient to its colour: the
+// gradients have a loop of their own, so that the processor works on the light of several steps at once.
+static inline void shade_steps(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels, global const uchar *table,
+                       const Packet *p, int k, int end, Span span, int form, const Real *position, Radiance *r) {
 #if SHADED
 #if NARROW_GRADIENTS
-    BlockPlaces places = block_places(view, p->low + p->low_pace * (float)k, p->low_pace);
+    BlockOffsets offsets = block_offsets(view, p->low + p->low_pace * (float)k, p->low_pace);
 #if INNER_WHOLE
     Fixed3 at = fixed3(along(p->start, p->pace, (Real)((float)k))), pace = fixed3_nearest(p->pace);
     #define NEXT at = add_fixed3(at, pace)
-    #define GRADIENT(i) narrow_gradient(view, voxels, &places, i, inner_of(at))
+    #define GRADIENT(i) narrow_gradient(view, voxels, &offsets, i, inner_of(at))
 #else
     #define NEXT (void)0
-    #define GRADIENT(i) narrow_gradient(view, voxels, &places, i, along(p->start, p->pace, (Real)((float)(k + i))))
+    #define GRADIENT(i) narrow_gradient(view, voxels, &offsets, i, along(p->start, p->pace, (Real)((float)(k + i))))
 #endif
 #else
     #define NEXT (void)0
@@ -160,7 +160,7 @@ static inline void see(constant const View *view, constant const EmissionAbsorpt
     Real weight[STRIDE];
     int lit = 0;
     for (int i = 0; i < end - k; i++, NEXT) {
-        Optical o = optical_at(table, span, form, place[i]);
+        Optical o = optical_at(table, span, form, position[i]);
         weight[lit] = weight_of(params, o.alpha, r);
         if (!any_lane(MASK(weight[lit] > 0.0f))) continue;
         colour[lit] = o.colour;
@@ -170,26 +170,26 @@ static inline void see(constant const View *view, constant const EmissionAbsorpt
     #undef NEXT
     for (int i = 0; i < lit; i++) add_light(shade(view, gradient[i], GRADIENT_UNIT, p->half_way, colour[i]), weight[i], r);
 #else
-    for (int i = 0; i < end - k; i++) composite(params, optical_at(table, span, form, place[i]), r);
+    for (int i = 0; i < end - k; i++) composite(params, optical_at(table, span, form, position[i]), r);
 #endif
 }
 
-// The steps from k to end - 1, at most STRIDE, all of them whole: first the values, then what is seen of them. Of two short loops the
-// processor has several steps under way at once; of a long one it sees no further than about a step.
+// The steps from k to end - 1, at most STRIDE, all of them whole: first the values, then their shading. In two short loops the
+// processor works on several steps at once; in a long one on about one.
 static inline void whole_steps(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
                                global const uchar *table, const Packet *p, int k, int end, Radiance *r) {
-    Real place[STRIDE], low = (Real)(INFINITY), high = (Real)(-INFINITY);
-    whole_steps_raw(view, voxels, p, k, end, place);
+    Real position[STRIDE], low = (Real)(INFINITY), high = (Real)(-INFINITY);
+    whole_steps_raw(view, voxels, p, k, end, position);
     for (int i = 0; i < end - k; i++) {
-        place[i] = place_of(params, place[i], INNER_UNIT);
-        low = LESSER(place[i], low), high = GREATER(place[i], high);
+        position[i] = table_position(params, position[i], INNER_UNIT);
+        low = LESSER(position[i], low), high = GREATER(position[i], high);
     }
     Span s = span_of(table, least_lane(low), greatest_lane(high));
     if (s.empty) return;
     int form = form_of(s);
-    if (form == ON_PIECE) see(view, params, voxels, table, p, k, end, s, ON_PIECE, place, r);
-    else if (form == ON_PIECES) see(view, params, voxels, table, p, k, end, s, ON_PIECES, place, r);
-    else see(view, params, voxels, table, p, k, end, s, ON_TABLE, place, r);
+    if (form == ON_PIECE) shade_steps(view, params, voxels, table, p, k, end, s, ON_PIECE, position, r);
+    else if (form == ON_PIECES) shade_steps(view, params, voxels, table, p, k, end, s, ON_PIECES, position, r);
+    else shade_steps(view, params, voxels, table, p, k, end, s, ON_TABLE, position, r);
 }
 #endif
 
@@ -225,7 +225,7 @@ static inline void edge_step(constant const View *view, constant const EmissionA
     composite(params, o, r);
 }
 
-// The steps from k to end - 1 of a packet; what it gathers stays in registers meanwhile.
+// The steps from k to end - 1 of a packet; its radiance stays in registers meanwhile.
 static inline void march(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
                          global const uchar *table, const Packet *p, int k, int end, Radiance *radiance) {
     Radiance r = *radiance;

@@ -1,5 +1,5 @@
-// Isosurfaces: where the value along a ray passes an isovalue. Rays look at the ends of their steps; where the two are on different
-// sides, the crossing is refined (shared/crossing.h) and lit. One work-item is one beam.
+// Isosurfaces: the crossings of rays with given values. Rays are sampled at the ends of their steps; if the two are on different sides, the
+// crossing is refined (shared/crossing.h) and lit. One work-item is one beam.
 // LAYERED: several surfaces, or some that are not opaque, are composited front to back. Otherwise a packet's rays go to their
 // first crossing, and all of them are refined and lit at once.
 
@@ -14,7 +14,7 @@
 
 typedef struct {
     Real ahead;          // the value at the end of the last step
-    int fresh;           // whether that is not known, since a leap came after it
+    int fresh;           // true if that is not known, since a leap came after it
 #if LAYERED
     Real3 colour;
     Real transmittance;
@@ -52,17 +52,17 @@ static inline Stretch stretch_of(constant const View *view, VOLUME voxels, const
         return e;
     }
     Real from = fmax(e.t, p->ray.t_near), to = fmin(e.t + e.length, p->ray.t_far);
-    Mask carried = s->fresh ? (Mask)(0) : MASK(p->ray.t_near < e.t);
+    Mask continued = s->fresh ? (Mask)(0) : MASK(p->ray.t_near < e.t);
     e.inside = MASK(to > from);
     e.t = select(e.t, from, e.inside);
     e.length = select((Real)(0.0f), to - from, e.inside);
     e.before = sample_raw(view, voxels, along(p->ray.origin, p->ray.direction, e.t));
-    e.before = select(e.before, s->ahead, carried);
+    e.before = select(e.before, s->ahead, continued);
     e.after = sample_raw(view, voxels, along(p->ray.origin, p->ray.direction, e.t + e.length));
     return e;
 }
 
-// What goes on the film of a surface met at t: `colour` in its light, or the distance from the eye.
+// The film's value for a surface met at t: `colour` in its light, or the distance from the eye.
 static inline Real3 surface_colour(constant const View *view, constant const Isosurface *params, VOLUME voxels, const Packet *p,
                                    const Bracket *b, Real t, Mask found, Real3 colour) {
     if (params->depth) {
@@ -125,7 +125,7 @@ static inline void seek(constant const View *view, constant const Isosurface *pa
     *search = s;
 }
 
-// Whether any ray of the packet is still on its way at step k.
+// True if any ray of the packet goes on at step k.
 static inline int goes_on(constant const View *view, constant const Isosurface *params, const Packet *p, const Search *s, int k) {
     Mask inside = MASK(p->ray.t_far > fmax(p->ray.t_near, (Real)((float)k * view->step)));
 #if LAYERED

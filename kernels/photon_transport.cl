@@ -5,6 +5,7 @@
 // work-group works and has a grid of its own, for atomics take a third of the time.
 
 #include "shared/compton.h"
+#include "shared/dda.h"
 #include "shared/deposit.h"
 #include "shared/lanes.h"
 #include "shared/medium.h"
@@ -14,9 +15,8 @@
 #include "shared/queue.h"
 #include "shared/rng.h"
 #include "shared/tally.h"
-#include "shared/walls.h"
 
-// What a work-item works on.
+// The packet of photons of a work-item, and its sums.
 typedef struct {
     Photon photon;
     Mask alive;
@@ -26,7 +26,7 @@ typedef struct {
     Grid grid;
 } Work;
 
-// A step of all lanes: how it ends, and what is known of the place where it began.
+// A step of all lanes: its end, and the medium where it began.
 typedef struct {
     Mask hit, crosses, late; // at a collision, at a cell boundary, at the time gate
     Int medium;
@@ -39,7 +39,7 @@ static inline Work no_work(constant const PhotonTransport *params, Grid grid) {
     Work w;
     Photon *photon = &w.photon;
     photon->p = photon->d = real3(0.0f, 0.0f, 0.0f);
-    photon->cell.x = photon->cell.y = photon->cell.z = photon->medium = photon->reach = photon->scatterings = (Int)(0);
+    photon->cell.x = photon->cell.y = photon->cell.z = photon->medium = photon->clearance = photon->scatterings = (Int)(0);
     photon->weight = photon->depth = photon->optical = photon->path = (Real)(0.0f);
     photon->energy = (Real)(params->source_kev);
     photon->number = photon->event = (UInt)(0u);
@@ -67,8 +67,8 @@ static inline void begin(constant const FieldPass *pass, constant const PhotonTr
         gain(&w->gains.sums[LEDGER_LOST], photon->weight, missed);
         tally_fixed(ledger, (Int)(LEDGER_MISSED), ulong_from((UInt)(1u)), missed);
     }
-#if REACHES
-    look_around(params, table, fresh, photon);
+#if HAS_CLEARANCE
+    update_clearance(params, table, fresh, photon);
 #endif
     w->steps = select(w->steps, (Int)(0), fresh);
     w->alive |= fresh & ~missed & MASK(photon->weight > 0.0f);
@@ -76,16 +76,16 @@ static inline void begin(constant const FieldPass *pass, constant const PhotonTr
 
 // The medium that photons are in.
 static inline Int medium_here(constant const PhotonTransport *params, global const float *table, const Photon *photon) {
-#if REACHES
+#if HAS_CLEARANCE
     return photon->medium;
 #else
     // Within blocks the medium counts at collisions alone, where no boundary bends light.
-    if (!BLOCK_WALLS || GAMMA || params->mismatch) return medium_of(params, table, photon->cell, photon->p);
+    if (!BLOCK_CELLS || GAMMA || params->mismatch) return medium_of(params, table, photon->cell, photon->p);
     return (Int)(0);
 #endif
 }
 
-// How often free paths end where photons are, per mm.
+// The rate at which free paths end where photons are, per mm.
 static inline Real rate_here(constant const PhotonTransport *params, global const float *table, const Photon *photon, Int medium) {
 #if GAMMA
     Real rate = attenuation_at(params, table, medium, photon->energy).extinction;
@@ -110,7 +110,7 @@ static inline Mask gate(constant const PhotonTransport *params, global const flo
 // Scores tracks of length t.
 static inline void score_track(constant const PhotonTransport *params, global const float *table, Int medium, Real rate, Real t, Work *w) {
     Photon *photon = &w->photon;
-#if VOXEL_WALLS
+#if VOXEL_CELLS
     Real amount = photon->weight * t * params->deposit_scale;
     if (params->tally == TALLY_ABSORBED_TRACK) amount *= rate * (1.0f - medium_number(params, table, medium, MEDIUM_ALBEDO));
     grid_add(&w->grid, cell_voxel(params, photon->cell), fixed(amount), w->alive);
@@ -126,17 +126,17 @@ static inline Step advance(constant const FieldPass *pass, constant const Photon
     s.medium = medium_here(params, table, photon);
     s.random = draw_ahead(pass, photon, w->alive, &w->draws);
     s.rate = rate_here(params, table, photon, s.medium);
-    s.ahead = look_ahead(params, table, photon);
-    Real t_wall = s.ahead.nearest;
+    s.ahead = boundaries_ahead(params, table, photon);
+    Real t_boundary = s.ahead.nearest;
 #if TRACKING == TRACKING_MARCH
     // The lecture's march: a free path is as many whole steps as it takes to use up its optical depth.
-    Real t = fmin(t_wall, (Real)(params->march_step_mm));
-    Mask at_wall = MASK(t_wall <= params->march_step_mm);
-    s.hit = w->alive & ~at_wall & MASK(photon->depth <= s.rate * t) & MASK(s.rate > 0.0f);
+    Real t = fmin(t_boundary, (Real)(params->march_step_mm));
+    Mask at_boundary = MASK(t_boundary <= params->march_step_mm);
+    s.hit = w->alive & ~at_boundary & MASK(photon->depth <= s.rate * t) & MASK(s.rate > 0.0f);
 #else
-    s.hit = MASK(photon->depth < s.rate * t_wall) & w->alive;
-    Mask at_wall = ~s.hit;
-    Real t = select(t_wall, photon->depth * reciprocal(s.rate), s.hit);
+    s.hit = MASK(photon->depth < s.rate * t_boundary) & w->alive;
+    Mask at_boundary = ~s.hit;
+    Real t = select(t_boundary, photon->depth * reciprocal(s.rate), s.hit);
 #endif
     s.late = (Mask)(0);
     if (params->gate_mm < 1e30f) {
@@ -147,7 +147,7 @@ static inline Step advance(constant const FieldPass *pass, constant const Photon
     photon->p = select3(photon->p, along(photon->p, photon->d, t), w->alive);
     photon->path += select((Real)(0.0f), t, w->alive);
     photon->depth = select(photon->depth, fmax(mad(-s.rate, t, photon->depth), (Real)(0.0f)), w->alive & ~s.hit);
-    s.crosses = w->alive & ~s.hit & ~s.late & at_wall;
+    s.crosses = w->alive & ~s.hit & ~s.late & at_boundary;
     return s;
 }
 
@@ -155,10 +155,10 @@ static inline Step advance(constant const FieldPass *pass, constant const Photon
 static inline void score_collision(constant const PhotonTransport *params, global const float *table, const Medium *m, Real sigma, ULong absorbed,
                                    Mask real, Work *w) {
     const Photon *photon = &w->photon;
-#if REACHES
-    Int voxel = cell_voxel(params, cell_within(params, photon->cell, photon->reach, photon->p));
+#if HAS_CLEARANCE
+    Int voxel = cell_voxel(params, cell_within(params, photon->cell, photon->clearance, photon->p));
 #else
-    Int voxel = VOXEL_WALLS ? cell_voxel(params, photon->cell) : voxel_at(params, photon->p);
+    Int voxel = VOXEL_CELLS ? cell_voxel(params, photon->cell) : voxel_at(params, photon->p);
 #endif
     ULong amount = absorbed;
     if (params->tally == TALLY_FLUENCE) amount = fixed(photon->weight * params->deposit_scale / sigma);
@@ -180,7 +180,7 @@ static inline Real roulette(constant const FieldPass *pass, constant const Photo
     return select(left, gained, faint);
 }
 
-#if BLOCK_WALLS
+#if BLOCK_CELLS
 // The real ones of the tentative collisions `hit`; *sigma is the extinction there.
 static inline Mask real_of(constant const PhotonTransport *params, global const float *table, global ulong *ledger, const Step *s, Int medium,
                            Mask hit, Photon *photon, Real *sigma) {
@@ -199,8 +199,8 @@ static inline Mask scatter(constant const FieldPass *pass, constant const Photon
                            const Step *s, Work *w) {
     Photon *photon = &w->photon;
     Mask hit = s->hit, real = hit;
-#if TRACKING == TRACKING_MARCH || BLOCK_WALLS
-    // The medium is that of the place which the photon has come to.
+#if TRACKING == TRACKING_MARCH || BLOCK_CELLS
+    // The medium is that of the point which the photon has come to.
     Int medium = medium_of(params, table, photon->cell, photon->p);
 #else
     Int medium = s->medium;
@@ -210,11 +210,11 @@ static inline Mask scatter(constant const FieldPass *pass, constant const Photon
     Real sigma = s->rate, one_minus, one_plus;
 #if GAMMA
     m.albedo = attenuation_at(params, table, medium, photon->energy).albedo;
-    // Weight is energy: what the electron gets is absorbed as well. Below the tables all of it is.
+    // Weight is energy: the part that the electron gets is absorbed as well. Below the tables all of it is.
     Real kept = compton(pass, photon, photon->energy, hit, &one_minus);
     m.albedo *= select((Real)(0.0f), kept, MASK(kept * photon->energy > params->gamma_least_kev));
 #endif
-#if BLOCK_WALLS
+#if BLOCK_CELLS
     real = real_of(params, table, ledger, s, medium, hit, photon, &sigma);
     if (!any_lane(real)) {
         photon->event += as_UInt(select((Int)(0), (Int)(1), hit));
@@ -236,7 +236,7 @@ static inline Mask scatter(constant const FieldPass *pass, constant const Photon
 #else
     sample_phase(table, &m, unit_open(s->random.a), &one_minus, &one_plus);
 #endif
-    photon->d = select3(photon->d, turned(photon->d, one_minus, one_plus, unit_open(s->random.b)), goes_on);
+    photon->d = select3(photon->d, rotate_direction(photon->d, one_minus, one_plus, unit_open(s->random.b)), goes_on);
     photon->scatterings += select((Int)(0), (Int)(1), goes_on);
     photon->event += as_UInt(select((Int)(0), (Int)(1), hit));
     return goes_on | (hit & ~real);

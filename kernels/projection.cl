@@ -55,8 +55,8 @@ static inline float part_bound(constant const View *view, constant const Project
         float p = b->origin[i] + b->direction[i] * ((float)first * view->step);
         float q = b->origin[i] + b->direction[i] * ((float)last * view->step);
         count[i] = (view->dims[i] + CELL - 1) / CELL;
-        from[i] = clamp((int)((fmin(p, q) - b->reach[i] - wider) * (1.0f / CELL)), 0, count[i] - 1);
-        to[i] = clamp((int)((fmax(p, q) + b->reach[i] + wider) * (1.0f / CELL)), 0, count[i] - 1);
+        from[i] = clamp((int)((fmin(p, q) - b->half_width[i] - wider) * (1.0f / CELL)), 0, count[i] - 1);
+        to[i] = clamp((int)((fmax(p, q) + b->half_width[i] + wider) * (1.0f / CELL)), 0, count[i] - 1);
     }
     global const Voxel *ends = (global const Voxel *)ranges + (params->sign > 0.0f ? 1 : 0);
     Voxel least = ends[2 * ((from[2] * count[1] + from[1]) * count[0] + from[0])], greatest = least;

@@ -1,6 +1,6 @@
 // Light that is scattered once on its way to the eye, and what comes straight. From the eye a free flight finds a collision; from there
 // a ratio flight goes to every light, and a free flight in a direction of the phase function to the sky. Points, spheres and quads are
-// also lit from places chosen by the angle under which they are seen from them (Kulla & Fajardo, "Importance Sampling Techniques for
+// also sampled equiangularly: from points on the ray that are chosen by the angle under which they see the light (Kulla & Fajardo, "Importance Sampling Techniques for
 // Path Tracing in Participating Media", EGSR 2012): t - t_light = D tan(theta), density D / ((theta_b - theta_a) (D^2 + (t - t_light)^2)).
 // The free flight's density is known only on average, e = sigma exp(-sigma t); any weights that sum to 1 leave the mean as it is.
 // One work-item is a tile of ITEM x ITEM pixels; a lane that is through with its sample takes the next of them.
@@ -15,8 +15,8 @@
 #include "shared/tile.h"
 #include "shared/tracker.h"
 
-// What a lane is at: 0 the way from the eye; 1 .. lights a light seen from the collision; then the sky; then for each light the way
-// from the eye to a place chosen by angle, and from there to the light.
+// The task of a lane: 0 the way from the eye; 1 .. lights a light seen from the collision; then the sky; then for each light the way from
+// the eye to an equiangular vertex, and from there to the light.
 typedef struct {
     Flight flight;
     Int at, task;
@@ -24,15 +24,15 @@ typedef struct {
     Real alpha;
     Real3 entry, entry_world, d; // where the ray from the eye enters the volume
     Real length, t_from;         // how far it goes through it; where it begins
-    Mask met;                    // whether it met a collision,
-    Real3 place, place_world;    // and where
-    Real3 scattered;             // what of its light leaves it
+    Mask met;                    // true if it met a collision,
+    Real3 vertex, vertex_world;   // and where
+    Real3 scattered;             // the light that leaves it
     Real density;                // of the phase function's direction
 } Sample;
 
 static inline void begin(constant const View *view, constant const Scattering *params, Int column, Int row, Mask fresh, Sample *s) {
     Flight *f = &s->flight;
-    Sight sight = look(view, params, place_in_pixel(f->sample), column, row, fresh, f);
+    CameraFlight camera = begin_camera_flight(view, params, sample_offset(f->sample), column, row, fresh, f);
     s->at = select(s->at, row * view->width + column, fresh);
     s->task = select(s->task, (Int)(0), fresh);
     s->light = select3(s->light, real3((Real)(0.0f), (Real)(0.0f), (Real)(0.0f)), fresh);
@@ -41,15 +41,15 @@ static inline void begin(constant const View *view, constant const Scattering *p
     s->entry = select3(s->entry, f->p, fresh);
     s->entry_world = select3(s->entry_world, world_of(params, f->p), fresh);
     s->d = select3(s->d, f->d, fresh);
-    s->length = select(s->length, sight.length, fresh);
-    s->t_from = select(s->t_from, sight.eye - sight.entry, fresh);
+    s->length = select(s->length, camera.length, fresh);
+    s->t_from = select(s->t_from, camera.eye - camera.entry, fresh);
     aim(view, params, fresh, f);
 }
 
 // The density of the length t by the angle under which the light is seen; and, where it is to `choose` one, a length by that angle from the
 // number u.
 static inline Real by_angle(const Sample *s, const Light *l, Real u, Mask choose, Real *t) {
-    Real3 middle = select3(l->place, along(along(l->place, l->u, (Real)(0.5f)), l->v, (Real)(0.5f)), MASK(l->kind == LIGHT_QUAD));
+    Real3 middle = select3(l->position, along(along(l->position, l->u, (Real)(0.5f)), l->v, (Real)(0.5f)), MASK(l->kind == LIGHT_QUAD));
     Real3 to = minus3(middle, s->entry_world);
     Real t_light = dot3(to, s->d);
     Real3 off = minus3(to, scale3(s->d, t_light));
@@ -65,7 +65,7 @@ static inline Real by_angle(const Sample *s, const Light *l, Real u, Mask choose
 
 static inline Real by_flight(constant const Scattering *params, Real t) { return params->sigma_mean * exp(-params->sigma_mean * t); }
 
-// The light that reaches a place from a light, scattered towards the eye, with the part of it that is not left to the phase function.
+// The light that reaches a vertex from a light, scattered towards the eye, with the share of next-event estimation.
 static inline Real3 lit(constant const Scattering *params, global const float *table, const Light *l, Real3 at, Real3 from, UInt4Lanes r,
                         LightRay *ray) {
     Medium m = phase_of(params);
@@ -81,14 +81,14 @@ static inline Mask from_collision(constant const View *view, constant const Scat
     UInt4Lanes r = draw(view, f, 1);
     Light l = light_of(params, table, which);
     LightRay ray;
-    Real3 light = times3(s->scattered, lit(params, table, &l, s->place_world, s->d, r, &ray));
+    Real3 light = times3(s->scattered, lit(params, table, &l, s->vertex_world, s->d, r, &ray));
     if (params->equiangular) {
-        Real3 way = minus3(s->place_world, s->entry_world);
+        Real3 way = minus3(s->vertex_world, s->entry_world);
         Real t = sqrt(dot3(way, way)), mean = by_flight(params, t), angle = by_angle(s, &l, (Real)(0.5f), (Mask)(0), &t);
         light = select3(light, scale3(light, mean / (mean + angle)), MASK(l.kind != LIGHT_SUN));
     }
     on &= MASK(magnitude(light) > 0.0f);
-    fly_to(s->place, ray.d, ray.length, light, free_depth(r.c), on, f);
+    fly_to(s->vertex, ray.d, ray.length, light, free_depth(r.c), on, f);
     return on;
 }
 
@@ -100,12 +100,12 @@ static inline Mask to_sky(constant const View *view, constant const Scattering *
     Real one_minus, one_plus;
     sample_phase(table, &m, unit_open(r.a), &one_minus, &one_plus);
     s->density = select(s->density, phase_density(table, &m, one_minus), on);
-    fly_on(s->place, turned(s->d, one_minus, one_plus, unit_open(r.b)), s->scattered, free_depth(r.c), on, f);
+    fly_on(s->vertex, rotate_direction(s->d, one_minus, one_plus, unit_open(r.b)), s->scattered, free_depth(r.c), on, f);
     return on;
 }
 
-// Flights from the eye to a place chosen by the angle of light `which`; it carries what will be scattered there of density 1.
-static inline Mask to_place(constant const View *view, constant const Scattering *params, global const float *table, Mask on, Int which, Sample *s) {
+// Flights from the eye to an equiangular vertex of light `which`; their throughput is the scattered part there at a density of 1.
+static inline Mask to_equiangular(constant const View *view, constant const Scattering *params, global const float *table, Mask on, Int which, Sample *s) {
     Flight *f = &s->flight;
     UInt4Lanes r = draw(view, f, 1);
     Light l = light_of(params, table, which);
@@ -117,15 +117,15 @@ static inline Mask to_place(constant const View *view, constant const Scattering
     return on;
 }
 
-// From the place that was flown to, to the light.
-static inline Mask from_place(constant const View *view, constant const Scattering *params, VOLUME voxels, global const float *table, Mask on, Int which,
+// Flights from the equiangular vertex to the light.
+static inline Mask from_equiangular(constant const View *view, constant const Scattering *params, VOLUME voxels, global const float *table, Mask on, Int which,
                               Sample *s) {
     Flight *f = &s->flight;
     UInt4Lanes r = draw(view, f, 1);
     Light l = light_of(params, table, which);
     LightRay ray;
     Real3 light = lit(params, table, &l, world_of(params, f->p), s->d, r, &ray);
-    light = scale3(times3(light, f->carried), f->weight * density_at(view, params, voxels, f->p));
+    light = scale3(times3(light, f->throughput), f->weight * density_at(view, params, voxels, f->p));
     on &= MASK(magnitude(light) > 0.0f);
     fly_to(f->p, ray.d, ray.length, light, free_depth(r.c), on, f);
     return on;
@@ -146,11 +146,11 @@ static inline Mask advance(constant const View *view, constant const Scattering 
         if (any_lane(aims)) starts |= from_collision(view, params, table, aims, clamp(s->task - 1, (Int)(0), (Int)(max(lights - 1, 0))), s);
         if (any_lane(skies) && params->lit_by_chance) starts |= to_sky(view, params, table, skies, s);
         Int which = clamp((s->task - lights - 2) >> 1, (Int)(0), (Int)(max(lights - 1, 0)));
-        if (any_lane(flown)) starts |= from_place(view, params, voxels, table, flown, which, s);
+        if (any_lane(flown)) starts |= from_equiangular(view, params, voxels, table, flown, which, s);
         if (any_lane(flies)) {
-            Mask out = to_place(view, params, table, flies, which, s);
+            Mask out = to_equiangular(view, params, table, flies, which, s);
             starts |= out;
-            // There is no place to go on from.
+            // There is no vertex to go on from.
             s->task += select((Int)(0), (Int)(1), flies & ~out);
         }
         begun |= starts;
@@ -164,30 +164,30 @@ static inline Mask advance(constant const View *view, constant const Scattering 
 static inline void collide(constant const Scattering *params, global const float *table, Mask real, Sample *s) {
     Flight *f = &s->flight;
     Mask first = real & MASK(s->task == 0);
-    Real3 at = world_of(params, f->p), arrives = scale3(f->carried, f->weight);
-    Real3 origin = select3(s->place_world, s->entry_world, first), way = minus3(at, origin);
+    Real3 at = world_of(params, f->p), arrives = scale3(f->throughput, f->weight);
+    Real3 origin = select3(s->vertex_world, s->entry_world, first), way = minus3(at, origin);
     if (params->discs) {
         Real3 light = met(params, table, origin, f->d, select((Real)(0.0f), s->t_from, first), sqrt(dot3(way, way)), s->density, ~first & MASK(s->density > 0.0f), 1);
         add_light(&s->light, times3(light, arrives), real);
     }
     add_light(&s->light, by_colour(arrives, params->emission), real);
     Real3 leaves = by_colour(arrives, params->albedo);
-    s->place = select3(s->place, f->p, first);
-    s->place_world = select3(s->place_world, at, first);
+    s->vertex = select3(s->vertex, f->p, first);
+    s->vertex_world = select3(s->vertex_world, at, first);
     s->scattered = select3(s->scattered, leaves, first);
     s->met |= first & MASK(magnitude(leaves) > 0.0f);
 }
 
-// Flights that came to their end: at a light, at a place, or out of the volume.
+// Flights that came to their end: at a light, at a vertex, or out of the volume.
 static inline void arrive(constant const Scattering *params, global const float *table, Mask over, Sample *s) {
     Flight *f = &s->flight;
-    Real3 arrives = scale3(f->carried, f->weight);
+    Real3 arrives = scale3(f->throughput, f->weight);
     Mask flown = MASK(s->task > params->lights + 1) & MASK(((s->task - params->lights) & 1) == 0);
     add_light(&s->light, arrives, over & f->ratio & ~flown);
     Mask out = over & ~f->ratio, first = out & MASK(s->task == 0);
     if (!any_lane(out)) return;
     if (params->discs) {
-        Real3 origin = select3(s->place_world, s->entry_world, first);
+        Real3 origin = select3(s->vertex_world, s->entry_world, first);
         Real3 light = met(params, table, origin, f->d, select((Real)(0.0f), s->t_from, first), (Real)(1e30f), s->density, ~first & MASK(s->density > 0.0f), 1);
         add_light(&s->light, times3(light, arrives), out);
     }
@@ -202,7 +202,7 @@ kernel void single_scatter(constant View *view, constant Scattering *params, VOL
     Flight *f = &s.flight;
     Real zero = (Real)(0.0f);
     *f = no_flight(tile.sample);
-    s.light = s.entry = s.entry_world = s.d = s.place = s.place_world = s.scattered = real3(zero, zero, zero);
+    s.light = s.entry = s.entry_world = s.d = s.vertex = s.vertex_world = s.scattered = real3(zero, zero, zero);
     s.at = s.task = (Int)(0);
     s.alpha = s.length = s.t_from = s.density = zero;
     s.met = (Mask)(0);

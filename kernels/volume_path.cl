@@ -1,6 +1,6 @@
 // The radiative transfer equation by paths from the eye: L = sum over scatterings of throughput * (albedo phase) * light, unbiased. At
 // each scattering one light is chosen and aimed at (next-event estimation, its transmittance by a ratio flight), then the path goes on in
-// a direction of the phase function; what it meets there of the sky and of lights that have a size is weighed by the balance
+// a direction of the phase function; the sky and lights of some size that it meets there are weighed by the balance
 // heuristic. One work-item is a tile of ITEM x ITEM pixels; a lane whose path has ended takes the next of them.
 
 #include "shared/camera_flight.h"
@@ -17,7 +17,7 @@
 typedef struct {
     Flight flight;
     Int at;                    // the pixel in the film
-    Real3 light;               // what has come to the eye
+    Real3 light;               // that has come to the eye
     Real alpha;
     Int scatterings;
     Real density;              // of the direction in which the path flies, per steradian; 0 on the way from the eye
@@ -31,39 +31,39 @@ typedef struct {
 static inline void begin(constant const View *view, constant const Scattering *params, Int column, Int row, Mask fresh, Path *path,
                          Mask *done) {
     Flight *f = &path->flight;
-    Sight sight = look(view, params, place_in_pixel(f->sample), column, row, fresh, f);
+    CameraFlight camera = begin_camera_flight(view, params, sample_offset(f->sample), column, row, fresh, f);
     path->at = select(path->at, row * view->width + column, fresh);
     path->light = select3(path->light, real3((Real)(0.0f), (Real)(0.0f), (Real)(0.0f)), fresh);
     path->alpha = select(path->alpha, (Real)(1.0f), fresh);
     path->scatterings = select(path->scatterings, (Int)(0), fresh);
     path->density = select(path->density, (Real)(0.0f), fresh);
-    path->t_from = select(path->t_from, sight.eye - sight.entry, fresh);
+    path->t_from = select(path->t_from, camera.eye - camera.entry, fresh);
     path->from_world = select3(path->from_world, world_of(params, f->p), fresh);
-    Mask enters = fresh & sight.meets & MASK(sight.entry > sight.eye);
+    Mask enters = fresh & camera.meets & MASK(camera.entry > camera.eye);
     if (params->index != 1.0f && any_lane(enters)) {
-        Mask back = cross_face(view, 1.0f / params->index, face_at(view, f->p), unit_open(sight.number), enters, &f->d);
+        Mask back = cross_face(view, 1.0f / params->index, face_at(view, f->p), unit_open(camera.number), enters, &f->d);
         if (params->sky) add_light(&path->light, sky_of(params, f->d), back);
-        f->carried = select3(f->carried, scale3(f->carried, (Real)(1.0f / (params->index * params->index))), enters);
+        f->throughput = select3(f->throughput, scale3(f->throughput, (Real)(1.0f / (params->index * params->index))), enters);
         *done |= back;
     }
     aim(view, params, fresh, f);
 }
 
-// Flights that come to a face from inside: what is reflected stays.
+// Flights that come to a face from inside. Returns those that are reflected.
 static inline Mask surface_out(constant const View *view, constant const Scattering *params, Mask out, Int face, Path *path) {
     Flight *f = &path->flight;
     Mask back = cross_face(view, params->index, face, unit_open(draw(view, f, 4).a), out, &f->d);
     // In clear glass a path that is totally reflected would go on for ever: a face counts as much as a hundred collisions.
     f->event += as_UInt(select((Int)(0), (Int)(100), out));
-    f->carried = select3(f->carried, scale3(f->carried, (Real)(params->index * params->index)), out & ~back);
+    f->throughput = select3(f->throughput, scale3(f->throughput, (Real)(params->index * params->index)), out & ~back);
     return back;
 }
 
-// What the flight of a path has met that shines, up to the length `to`.
+// Adds the light of lights that the flight of a path has met, up to the length `to`.
 static inline void meet(constant const Scattering *params, global const float *table, Path *path, Real to, Mask on) {
     if (!params->discs) return;
     Real3 light = met(params, table, path->from_world, path->flight.d, path->t_from, to, path->density, params->next_event ? MASK(path->density > 0.0f) : (Mask)(0), 0);
-    add_light(&path->light, scale3(times3(light, path->flight.carried), path->flight.weight), on);
+    add_light(&path->light, scale3(times3(light, path->flight.throughput), path->flight.weight), on);
 }
 
 // Paths that scatter: light emitted there, a light aimed at, a direction to go on in. Returns those that have ended.
@@ -72,7 +72,7 @@ static inline Mask scatter(constant const View *view, constant const Scattering 
     Flight *f = &path->flight;
     Real3 at = world_of(params, f->p), way = minus3(at, path->from_world);
     meet(params, table, path, sqrt(dot3(way, way)), real);
-    Real3 arrives = scale3(f->carried, f->weight);
+    Real3 arrives = scale3(f->throughput, f->weight);
     add_light(&path->light, by_colour(arrives, params->emission), real);
     path->scatterings += select((Int)(0), (Int)(1), real);
     Real3 leaves = by_colour(arrives, params->albedo);
@@ -93,7 +93,7 @@ static inline Mask scatter(constant const View *view, constant const Scattering 
     Medium m = phase_of(params);
     Real one_minus, one_plus;
     sample_phase(table, &m, unit_open(r.a), &one_minus, &one_plus);
-    path->next = select3(path->next, turned(f->d, one_minus, one_plus, unit_open(r.b)), goes_on);
+    path->next = select3(path->next, rotate_direction(f->d, one_minus, one_plus, unit_open(r.b)), goes_on);
     path->density = select(path->density, phase_density(table, &m, one_minus), goes_on);
     path->from = select3(path->from, f->p, goes_on);
     path->from_world = select3(path->from_world, at, goes_on);
@@ -128,7 +128,7 @@ static inline Mask arrive(constant const View *view, constant const Scattering *
     Flight *f = &path->flight;
     Mask lit = over & f->ratio, out = over & ~f->ratio;
     if (any_lane(lit)) {
-        add_light(&path->light, scale3(f->carried, f->weight), lit);
+        add_light(&path->light, scale3(f->throughput, f->weight), lit);
         fly_on(path->from, path->next, path->throughput, path->next_depth, lit, f);
         *elsewhere |= lit;
     }
@@ -141,8 +141,8 @@ static inline Mask arrive(constant const View *view, constant const Scattering *
     meet(params, table, path, (Real)(1e30f), out);
     Mask unscattered = out & MASK(path->scatterings == 0);
     Mask seen = params->sky_visible ? out : out & ~unscattered;
-    if (params->sky) add_light(&path->light, scale3(times3(sky_of(params, f->d), f->carried), f->weight), seen);
-    Real through = f->weight * (f->carried.x + f->carried.y + f->carried.z) * (1.0f / 3.0f);
+    if (params->sky) add_light(&path->light, scale3(times3(sky_of(params, f->d), f->throughput), f->weight), seen);
+    Real through = f->weight * (f->throughput.x + f->throughput.y + f->throughput.z) * (1.0f / 3.0f);
     if (!(params->sky && params->sky_visible)) path->alpha = select(path->alpha, 1.0f - through, unscattered);
     return out;
 }

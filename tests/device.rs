@@ -6,8 +6,8 @@
 #[path = "device/cells.rs"]
 mod cells;
 mod common;
-#[path = "device/develop.rs"]
-mod develop;
+#[path = "device/encode.rs"]
+mod encode;
 #[path = "device/names.rs"]
 mod names;
 
@@ -16,7 +16,7 @@ use std::process::Command;
 use std::sync::Mutex;
 
 use cloudchamber::device::cells::CellsPass;
-use cloudchamber::device::develop::Develop;
+use cloudchamber::device::encode::Encode;
 use cloudchamber::device::program::{Source, Variant};
 use cloudchamber::device::structs::{DeviceStruct, View};
 use cloudchamber::device::{self, Device, DeviceConfig, Range};
@@ -67,7 +67,7 @@ fn same_on_both_sides<T: DeviceStruct>() {
 fn structs_lie_the_same_on_host_and_device() {
     same_on_both_sides::<View>();
     same_on_both_sides::<CellsPass>();
-    same_on_both_sides::<Develop>();
+    same_on_both_sides::<Encode>();
     same_on_both_sides::<EmissionAbsorption>();
     same_on_both_sides::<FieldPass>();
     same_on_both_sides::<Isosurface>();

@@ -1,5 +1,5 @@
-// Samples of 16 or 8 lanes that are within NARROW voxels of each other: the 4 x 4 x 4 voxels that they read come by a load a row, all
-// lanes together, and are read by permutations. What a lane would gather for itself costs two to four times as much.
+// Samples of 16 or 8 lanes that are within NARROW voxels of each other read the same 4 x 4 x 4 voxels: these are loaded row by row for all
+// lanes, and read by permutations. Gathers lane by lane cost two to four times as much.
 #ifndef SHARED_BLOCK_H
 #define SHARED_BLOCK_H
 
@@ -31,17 +31,17 @@ static inline int4 load_rows(global const uchar *from, int row) {
 #define NARROW_LEAST 4
 #endif
 
-// Where the blocks of eight steps are: the offset of the lowest corner, and what leads from a voxel's numbers to its row in the
-// block (z * 4 + y), to its bytes in the row, and to its word in a field (z * 16 + y * 4 + x).
-typedef struct { uint offset[8]; int rows[8], bytes[8], words[8]; } BlockPlaces;
+// The blocks of eight steps: the offset of the lowest corner, and the terms that lead from a voxel's numbers to its row in the block
+// (z * 4 + y), to its bytes in the row, and to its word in a field (z * 16 + y * 4 + x).
+typedef struct { uint offset[8]; int rows[8], bytes[8], words[8]; } BlockOffsets;
 
-// `low` is the lanes' least place of the first step in voxels, `pace` its way to the next.
-static inline BlockPlaces block_places(constant const View *view, float4 low, float4 pace) {
+// `low` is the least position of the lanes in the first step in voxels, `pace` its displacement to the next.
+static inline BlockOffsets block_offsets(constant const View *view, float4 low, float4 pace) {
     float8 k = (float8)(0.0f, 1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f, 7.0f);
     #define FIRST(c, i) max(min(convert_int8(low.c + pace.c * k), view->dims[i] - 4 - AROUND), AROUND)
     int8 x = FIRST(x, 0), y = FIRST(y, 1), z = FIRST(z, 2);
     #undef FIRST
-    BlockPlaces c;
+    BlockOffsets c;
     vstore8((as_uint8(z) * (uint)view->dims[1] + as_uint8(y)) * (uint)view->dims[0] + as_uint8(x), 0, c.offset);
     vstore8(-(z * 4 + y), 0, c.rows);
     vstore8(x * -0x10001, 0, c.bytes);
@@ -49,7 +49,7 @@ static inline BlockPlaces block_places(constant const View *view, float4 low, fl
     return c;
 }
 
-// The block of voxels for a step, and where it is.
+// The block of voxels for a step, and the terms of its position.
 #if VOXEL == VOXEL_U8 && LANES == 16
 typedef struct { Int voxels, rows, bytes; } Block;
 #define BLOCK_ROW(b, at) __builtin_ia32_permvarsi512((b)->voxels, at)
@@ -67,7 +67,7 @@ static inline long4 load_wide_rows(global const uchar *from, int row) {
     return (long4)(LONG_AT(from), LONG_AT(from + row), LONG_AT(from + 2 * row), LONG_AT(from + 3 * row));
 }
 
-// From the address of its lowest corner, and what leads to its rows, bytes and words.
+// From the address of its lowest corner, and the terms that lead to its rows, bytes and words.
 static inline Block block_from(constant const View *view, global const uchar *from, int rows, int bytes, int words) {
     int row = view->dims[0] * VOXEL_BYTES, sheet = view->dims[1] * row;
     Block b;
@@ -93,12 +93,12 @@ static inline Block block_from(constant const View *view, global const uchar *fr
     return b;
 }
 
-static inline Block block_at(constant const View *view, VOLUME voxels, const BlockPlaces *c, int i) {
+static inline Block block_at(constant const View *view, VOLUME voxels, const BlockOffsets *c, int i) {
     return block_from(view, voxels + (size_t)c->offset[i] * VOXEL_BYTES, c->rows[i], c->bytes[i], c->words[i]);
 }
 
 #if VOXEL == VOXEL_F32
-// What lies between them, by the arithmetic of inner_raw. Of the three sheets that the lanes' nearer voxels are on a permutation reads two,
+// Interpolates in the block, by the arithmetic of inner_raw. Of the three sheets that the lanes' nearer voxels are on a permutation reads two,
 // and another, in the lanes that are there, the third; so for the farther ones.
 static inline Real block_raw(const Block *b, Real3 p) {
     Int ix = to_int(p.x), iy = to_int(p.y), iz = to_int(p.z), at = (iz << 4) + (iy << 2) + ix + b->first;
@@ -133,7 +133,7 @@ static inline Int block_sum(const Block *block, Inner i) {
 static inline Real block_raw(const Block *block, Inner i) { return WHOLE(block_sum(block, i)); }
 #endif
 
-// The same of a single step, whose least place is `low`.
+// The same for a single step, whose least position is `low`.
 static inline Real narrow_raw(constant const View *view, VOLUME voxels, Real3 p, float4 low) {
     int4 first = min(convert_int4(low), (int4)(view->dims[0], view->dims[1], view->dims[2], 4) - 4);
     size_t offset = ((size_t)first.z * view->dims[1] + first.y) * view->dims[0] + first.x;
@@ -197,9 +197,9 @@ static inline Real field_between(Field f, Int pair, const Inner *i) {
 
 // The gradient by central differences in step k of eight: the differences at the block's voxels are worked out once for all lanes, and
 // what lies between them is interpolated for each.
-static inline Real3 narrow_gradient(constant const View *view, VOLUME voxels, const BlockPlaces *places, int k, Inner i) {
-    WideBlock b = wide_block_at(view, voxels + places->offset[k]);
-    Int word = (i.z << 4) + (i.y << 2) + i.x + places->words[k], pair = (word | (word << 16)) + 0x10000;
+static inline Real3 narrow_gradient(constant const View *view, VOLUME voxels, const BlockOffsets *offsets, int k, Inner i) {
+    WideBlock b = wide_block_at(view, voxels + offsets->offset[k]);
+    Int word = (i.z << 4) + (i.y << 2) + i.x + offsets->words[k], pair = (word | (word << 16)) + 0x10000;
     Int rows = wide_rows(&b, 0);
     Field x = field_of(wide_rows(&b, 1), wide_rows(&b, -1));
     Field y = field_of(ROW_AFTER(rows, b.beside), ROW_BEFORE(rows, b.beside));
@@ -207,16 +207,16 @@ static inline Real3 narrow_gradient(constant const View *view, VOLUME voxels, co
     return real3(field_between(x, pair, &i), field_between(y, pair, &i), field_between(z, pair, &i));
 }
 #elif NARROW_GRADIENTS
-// The gradient by central differences in step k of eight: what the blocks a voxel to each side differ by.
-static inline Real3 narrow_gradient(constant const View *view, VOLUME voxels, const BlockPlaces *places, int k,
+// The gradient by central differences in step k of eight: the differences of the blocks a voxel to each side.
+static inline Real3 narrow_gradient(constant const View *view, VOLUME voxels, const BlockOffsets *offsets, int k,
 #if INNER_WHOLE
                                     Inner i) {
 #else
                                     Real3 p) {
 #endif
     int row = view->dims[0] * VOXEL_BYTES, sheet = view->dims[1] * row;
-    global const uchar *from = voxels + (size_t)places->offset[k] * VOXEL_BYTES;
-    #define AT(step) block_from(view, from + (step), places->rows[k], places->bytes[k], places->words[k])
+    global const uchar *from = voxels + (size_t)offsets->offset[k] * VOXEL_BYTES;
+    #define AT(step) block_from(view, from + (step), offsets->rows[k], offsets->bytes[k], offsets->words[k])
 #if INNER_WHOLE
     #define SLOPE(step) ({ Block after = AT(step), before = AT(-(step)); to_real(block_sum(&after, i) - block_sum(&before, i)); })
 #else

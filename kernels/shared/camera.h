@@ -41,7 +41,7 @@ static inline void clip_box(constant const View *view, float margin, Ray *ray) {
     clip_slab(ray->origin.z, ray->direction.z, margin, (float)view->dims[2] - margin, &ray->t_near, &ray->t_far);
 }
 
-// Clips t to where the plane's a x + b y + c z + d, in index units, is not negative.
+// Clips t to the half-space in which the plane's a x + b y + c z + d, in index units, is not negative.
 static inline void clip_plane(constant const float *plane, Ray *ray) {
     Real distance = mad(plane[0], ray->origin.x, mad(plane[1], ray->origin.y, mad(plane[2], ray->origin.z, (Real)(plane[3]))));
     Real speed = mad(plane[0], ray->direction.x, mad(plane[1], ray->direction.y, plane[2] * ray->direction.z));
@@ -53,7 +53,7 @@ static inline void clip_plane(constant const float *plane, Ray *ray) {
     ray->t_far = select(ray->t_far, (Real)(-1e30f), along & MASK(distance < 0.0f));
 }
 
-// Where the eye is on the ray through the image point (x, y).
+// The t of the eye on the ray through the image point (x, y).
 static inline Real eye_on_ray(constant const View *view, Real x, Real y) {
     if (!view->perspective) return (Real)(-view->t_eye);
     Real3 world = affine3(view->towards_world, view->right_world, view->down_world, x, y);

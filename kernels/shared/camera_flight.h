@@ -7,13 +7,13 @@
 #include "shared/lanes.h"
 #include "shared/rng.h"
 
-typedef struct { Mask meets; Real eye, entry, length; UInt number; } Sight; // of the volume from the eye, and a number that is left
+typedef struct { Mask meets; Real eye, entry, length; UInt number; } CameraFlight; // of the volume from the eye, and a number that is left
 
 // Begins a flight from the eye through a pixel in each lane of `fresh`.
-static inline Sight look(constant const View *view, constant const Scattering *params, float2 place, Int column, Int row, Mask fresh, Flight *f) {
-    Real x = to_real(column * view->stride) + place.x, y = to_real(row * view->stride) + place.y;
+static inline CameraFlight begin_camera_flight(constant const View *view, constant const Scattering *params, float2 offset, Int column, Int row, Mask fresh, Flight *f) {
+    Real x = to_real(column * view->stride) + offset.x, y = to_real(row * view->stride) + offset.y;
     Ray ray = camera_ray(view, x, y);
-    Sight s;
+    CameraFlight s;
     s.meets = MASK(ray.t_far > ray.t_near);
     s.eye = eye_on_ray(view, x, y);
     s.entry = select(s.eye, ray.t_near, s.meets);

@@ -1,4 +1,4 @@
-// Where a ray crosses an isosurface, to a ten-thousandth of a voxel, and what the surface is there.
+// The crossing of a ray with an isosurface, to a ten-thousandth of a voxel, and the surface's gradient and occlusion there.
 #ifndef SHARED_CROSSING_H
 #define SHARED_CROSSING_H
 
@@ -9,7 +9,7 @@
 #include "shared/rng.h"
 #include "shared/volume.h"
 
-// Two places along a ray between which the value passes the isovalue: f is the value less the isovalue.
+// Two points of a ray between which the value passes the isovalue: f is the value less the isovalue.
 typedef struct { Real t0, t1, f0, f1, isovalue; } Bracket;
 
 static inline Bracket bracket(Real t, Real length, Real before, Real after, Real isovalue) {
@@ -23,7 +23,7 @@ static inline Bracket select_bracket(Bracket no, Bracket yes, Mask m) {
     return b;
 }
 
-// Whether the isovalue is passed. With `nearest`, as in the lecture: whether the far end is in what is to be seen.
+// The lanes that pass the isovalue. With `nearest`, as in the lecture, those whose far end is at or beyond it.
 static inline Mask crossed(constant const Isosurface *params, const Bracket *b) {
 #if INTERPOLATION == INTERPOLATION_NEAREST
     return MASK(params->sign * b->f1 >= 0.0f);
@@ -76,7 +76,7 @@ static inline Real3 surface_gradient(constant const View *view, VOLUME voxels, i
     Mask inner = MASK(at.x > INNER_MARGIN) & MASK(at.x < nx) & MASK(at.y > INNER_MARGIN) & MASK(at.y < ny) & MASK(at.z > INNER_MARGIN) & MASK(at.z < nz);
     if (!any_lane(on & ~inner)) {
         Real3 g, middle = real3((Real)(0.5f * view->dims[0]), (Real)(0.5f * view->dims[1]), (Real)(0.5f * view->dims[2]));
-        inner_gradient(view, voxels, inner_place(select3(middle, at, on)), &g);
+        inner_gradient(view, voxels, inner_position(select3(middle, at, on)), &g);
         return scale3(g, (Real)(GRADIENT_UNIT));
     }
 #endif

@@ -88,9 +88,9 @@ static inline Curvature curvature(constant const View *view, Real3 g, Symmetric 
     Symmetric s = c.normal_change;
     Real trace = s.xx + s.yy + s.zz;
     Real frobenius = mad(s.xx, s.xx, mad(s.yy, s.yy, s.zz * s.zz)) + 2.0f * mad(s.xy, s.xy, mad(s.xz, s.xz, s.yz * s.yz));
-    Real apart = sqrt(fmax(2.0f * frobenius - trace * trace, (Real)(0.0f)));
-    c.first = 0.5f * (trace + apart);
-    c.second = 0.5f * (trace - apart);
+    Real root = sqrt(fmax(2.0f * frobenius - trace * trace, (Real)(0.0f)));
+    c.first = 0.5f * (trace + root);
+    c.second = 0.5f * (trace - root);
     return c;
 }
 

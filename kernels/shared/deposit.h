@@ -1,14 +1,14 @@
-// Adds what photons leave to the grid: at collisions, or along the way.
+// Adds deposits of photons to the grid: at collisions, or along their tracks.
 #ifndef SHARED_DEPOSIT_H
 #define SHARED_DEPOSIT_H
 
+#include "shared/dda.h"
 #include "shared/lanes.h"
 #include "shared/medium.h"
 #include "shared/tally.h"
-#include "shared/walls.h"
 
-// The grid's sums, and whether nobody else adds to them. Then it takes neither atomics nor branches, and what is added waits until the
-// next is: meanwhile its places come from memory. They are all over the grid, and waiting for them took a third of the time.
+// The grid's sums. If the work-item owns them, it needs neither atomics nor branches, and each deposit is added with the next one: its
+// addresses, which are all over the grid, are fetched meanwhile. Waiting for them took a third of the time.
 typedef struct { global ulong *sums; int own; Int idle; IntLanes to; ULongLanes amount; } Grid;
 
 // Clang for a processor knows how; oclgrind, which is for none, does not.
@@ -21,13 +21,13 @@ typedef struct { global ulong *sums; int own; Int idle; IntLanes to; ULongLanes 
 static inline Grid grid_at(global ulong *sums, int own, int voxels) {
     Grid g;
     g.sums = sums, g.own = own;
-    // Lanes that add nothing do so at places of their own: at one place they would wait for each other.
+    // Idle lanes add 0 at addresses of their own: at a common one they would wait for each other.
     g.idle = LANE_IDS % (Int)(voxels);
     g.to.v = g.idle, g.amount.v = ulong_zero();
     return g;
 }
 
-// Adds what waits.
+// Adds the deposit that waits.
 static inline void grid_flush(Grid *g) {
     for (int i = 0; i < LANES; i++) g->sums[g->to.lane[i]] += g->amount.lane[i];
 }
@@ -44,7 +44,7 @@ static inline void grid_add(Grid *g, Int voxel, ULong amount, Mask active) {
 
 // Adds a collision's deposit to the grid.
 static inline void deposit(constant const PhotonTransport *params, Grid *grid, Int voxel, Real3 p, ULong amount, Mask hit) {
-    // Layers and boundaries that have no end reach further than the grid.
+    // Layers and boundaries that have no end extend beyond the grid.
     if (params->endless) {
         hit &= MASK(p.x >= 0.0f) & MASK(p.x <= params->size_mm[0]) & MASK(p.y >= 0.0f) & MASK(p.y <= params->size_mm[1]);
         hit &= MASK(p.z >= 0.0f) & MASK(p.z <= params->size_mm[2]);
@@ -52,7 +52,7 @@ static inline void deposit(constant const PhotonTransport *params, Grid *grid, I
     grid_add(grid, voxel, amount, hit);
 }
 
-#if !VOXEL_WALLS
+#if !VOXEL_CELLS
 // Shares a straight flight out among the voxels that it crosses: weight times length, times the absorption for absorbed energy.
 static inline void deposit_track(constant const PhotonTransport *params, global const float *table, Grid *grid, Real3 p, Real3 d,
                                  Real length, Real weight, Mask on) {

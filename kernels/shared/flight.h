@@ -1,31 +1,31 @@
-// Flights of light through a volume whose values are densities: where each lane's light is, where it goes, and what it carries. Positions
+// Flights of light through a volume whose values are densities: the position, direction and throughput of each lane. Positions
 // are in index units, lengths in world units. A free flight ends at a real collision, or where it leaves the volume; a ratio flight goes
 // a given length and estimates the transmittance along it (tracker.h).
 #ifndef SHARED_FLIGHT_H
 #define SHARED_FLIGHT_H
 
+#include "shared/dda.h"
 #include "shared/lanes.h"
 #include "shared/phase.h"
 #include "shared/rng.h"
-#include "shared/walls.h"
 
 // A path of more collisions than this is cut and counted.
 #define MOST_EVENTS 1000000u
 
 typedef struct {
-    Real3 p, d, way;     // place; direction, of unit length in the world; the same in index units per world unit
+    Real3 p, d, way;     // position; direction, of unit length in the world; the same in index units per world unit
     Real3 inverse;       // 1 / way
     Cell cell;
     Real depth;          // what is left of the free path, in optical depth
     Real left;           // the length to the end of the flight
-    Real3 carried;       // light, or what of it gets to the eye
-    Real weight;         // what the flight makes of it
+    Real3 throughput;    // of the path, or the light that a ratio flight brings
+    Real weight;         // of the flight, which multiplies the throughput
     Mask ratio;
     uint sample;         // keys the random numbers, with
     UInt number, event;  // the pixel, and what has happened on its path
 } Flight;
 
-// Four numbers of a path's next event; `what` tells the draws of one event apart.
+// Four random numbers of a path's next event; `what` numbers the draws of one event.
 static inline UInt4Lanes draw(constant const View *view, const Flight *f, uint what) {
     UInt4Lanes ctr = {f->number, (UInt)(f->sample), f->event, (UInt)(view->stream + 0x6c696700u + 16u * what)};
     return philox(ctr, view->seed[0], view->seed[1]);
@@ -52,7 +52,7 @@ static inline Real3 by_colour(Real3 light, constant const float *colour) {
 static inline Flight no_flight(uint sample) {
     Flight f;
     Real zero = (Real)(0.0f);
-    f.p = f.d = f.way = f.inverse = f.carried = real3(zero, zero, zero);
+    f.p = f.d = f.way = f.inverse = f.throughput = real3(zero, zero, zero);
     f.cell.x = f.cell.y = f.cell.z = (Int)(0);
     f.depth = f.left = f.weight = zero;
     f.ratio = (Mask)(0);
@@ -67,30 +67,30 @@ static inline Real3 way_of(constant const View *view, Real3 d) {
     return real3(mad(w[0], d.x, mad(w[3], d.y, w[6] * d.z)), mad(w[1], d.x, mad(w[4], d.y, w[7] * d.z)), mad(w[2], d.x, mad(w[5], d.y, w[8] * d.z)));
 }
 
-// Points the lanes of `turned` along their d, from their p.
-static inline void aim(constant const View *view, constant const Scattering *params, Mask turned, Flight *f) {
+// Points the lanes of `aimed` along their d, from their p.
+static inline void aim(constant const View *view, constant const Scattering *params, Mask aimed, Flight *f) {
     Real3 way = way_of(view, f->d);
-    f->way = select3(f->way, way, turned);
-    f->inverse = select3(f->inverse, real3(1.0f / way.x, 1.0f / way.y, 1.0f / way.z), turned);
-    f->cell.x = select(f->cell.x, cell_on_axis(f->p.x, 0.0f, params->walls_per_voxel[0], params->walls[0]), turned);
-    f->cell.y = select(f->cell.y, cell_on_axis(f->p.y, 0.0f, params->walls_per_voxel[1], params->walls[1]), turned);
-    f->cell.z = select(f->cell.z, cell_on_axis(f->p.z, 0.0f, params->walls_per_voxel[2], params->walls[2]), turned);
+    f->way = select3(f->way, way, aimed);
+    f->inverse = select3(f->inverse, real3(1.0f / way.x, 1.0f / way.y, 1.0f / way.z), aimed);
+    f->cell.x = select(f->cell.x, cell_on_axis(f->p.x, 0.0f, params->cells_per_voxel[0], params->cells[0]), aimed);
+    f->cell.y = select(f->cell.y, cell_on_axis(f->p.y, 0.0f, params->cells_per_voxel[1], params->cells[1]), aimed);
+    f->cell.z = select(f->cell.z, cell_on_axis(f->p.z, 0.0f, params->cells_per_voxel[2], params->cells[2]), aimed);
 }
 
-// Sends the lanes of `on` on from the place p in the direction d, with what they carry: freely, until they collide or leave.
-static inline void fly_on(Real3 p, Real3 d, Real3 carried, Real depth, Mask on, Flight *f) {
+// Begins free flights of the lanes of `on` from p in the direction d with a throughput: they end where they collide or leave.
+static inline void fly_on(Real3 p, Real3 d, Real3 throughput, Real depth, Mask on, Flight *f) {
     f->p = select3(f->p, p, on);
     f->d = select3(f->d, d, on);
-    f->carried = select3(f->carried, carried, on);
+    f->throughput = select3(f->throughput, throughput, on);
     f->weight = select(f->weight, (Real)(1.0f), on);
     f->depth = select(f->depth, depth, on);
     f->left = select(f->left, (Real)(1e30f), on);
     f->ratio &= ~on;
 }
 
-// The same along a length, to see how much of it arrives.
-static inline void fly_to(Real3 p, Real3 d, Real length, Real3 carried, Real depth, Mask on, Flight *f) {
-    fly_on(p, d, carried, depth, on, f);
+// Begins ratio flights along a length, whose weight becomes the transmittance.
+static inline void fly_to(Real3 p, Real3 d, Real length, Real3 throughput, Real depth, Mask on, Flight *f) {
+    fly_on(p, d, throughput, depth, on, f);
     f->left = select(f->left, length, on);
     f->ratio |= on;
 }

@@ -1,5 +1,5 @@
-// Samples of packets whose lanes are all at least INNER_MARGIN voxels away from the box's faces: no clamps. A place is
-// given by inner_place, and values are in units of INNER_UNIT. Bytes and words are weighed in whole numbers, with weights of 15 bits that
+// Samples of packets whose lanes are all at least INNER_MARGIN voxels away from the box's faces: no clamps. A position is
+// given by inner_position, and values are in units of INNER_UNIT. Bytes and words are weighed in whole numbers, with weights of 15 bits that
 // add up to all of it: exact to some 2^-15 of their differences, and the same to the last bit for any number of lanes.
 #ifndef SHARED_INNER_H
 #define SHARED_INNER_H
@@ -14,9 +14,9 @@
 #if INTERPOLATION == INTERPOLATION_TRILINEAR && VOXEL != VOXEL_F32 && !VOLUMES_ARE_IMAGES
 #define INNER_WHOLE 1
 #define INNER_UNIT (1.0f / 32767.0f)
-// A place comes with 16 binary places.
-#define INNER_PLACES 65536.0f
-// What is cut off of a place, and of half of its product with a weight, is half of its last binary place on the average.
+// A position has 16 fractional bits.
+#define INNER_SCALE 65536.0f
+// Truncation takes half of the last bit off a position on the average, and as much off half of its product with a weight.
 #define INNER_ROUNDING 1.0f
 
 #if VOXEL == VOXEL_U16
@@ -63,8 +63,8 @@ static inline Weights weights_at(Int x) {
 #endif
 }
 
-// The part of them that the fraction of `place` gives to the farther of two.
-static inline Weights farther(Weights w, Int place) { return LEVEL_BUILTIN(pmulhuw)(w, BOTH(place)); }
+// The part of them that the fraction of `position` gives to the farther of two.
+static inline Weights farther(Weights w, Int position) { return LEVEL_BUILTIN(pmulhuw)(w, BOTH(position)); }
 
 static inline Weights less(Weights w, Weights part) { return w - part; }
 
@@ -84,8 +84,8 @@ static inline Weights weights_at(Int x) {
     return w;
 }
 
-static inline Weights farther(Weights w, Int place) {
-    Weights part = {(w.a * (place & 0xffff)) >> 16, (w.b * (place & 0xffff)) >> 16};
+static inline Weights farther(Weights w, Int position) {
+    Weights part = {(w.a * (position & 0xffff)) >> 16, (w.b * (position & 0xffff)) >> 16};
     return part;
 }
 
@@ -106,7 +106,7 @@ static inline Int weigh(Int word, int n, Weights w) {
 static inline Int product(Int small, int factor) { return small * factor; }
 #endif
 
-// A place or a way in whole parts of 2^-16 voxels.
+// A position or a displacement in whole parts of 2^-16 voxels.
 typedef struct { Int x, y, z; } Fixed3;
 
 static inline Fixed3 fixed3(Real3 p) {
@@ -121,7 +121,7 @@ static inline Fixed3 add_fixed3(Fixed3 a, Fixed3 b) {
     return sum;
 }
 
-// Where a sample is: its lowest corner in whole voxels, and the weights of the four pairs of voxels around it.
+// A sample: its lowest corner in whole voxels, and the weights of the four pairs of voxels around it.
 typedef struct { Fixed3 at; Int x, y, z; Weights near, next, far, beyond; } Inner;
 
 static inline Inner inner_of(Fixed3 p) {
@@ -149,7 +149,7 @@ static inline Real inner_raw(constant const View *view, VOLUME voxels, Real3 p) 
     #undef PAIR
 }
 
-// The four rows of voxels around a place.
+// The four rows of voxels around a position.
 typedef struct { Int here, below, behind, beyond; } Rows;
 
 // The gradient by central differences, in floats beyond x, with the rows that a value needs. Twelve gathers of bytes, or twenty of
@@ -161,15 +161,15 @@ static inline Real3 inner_slopes(constant const View *view, VOLUME voxels, Inner
     int row = view->dims[0] * VOXEL_BYTES, sheet = view->dims[1] * row;
 #if VOXEL == VOXEL_U8
     global const uchar *from = voxels - 1; // the lanes are a voxel or more inside
-    #define LINE_PLACE 1
+    #define LINE_BYTE 1
     #define SLOPE(y, z, v) to_real(weigh(v, 2, all) - weigh(v, 0, all))
 #else
     global const uchar *from = voxels;
-    #define LINE_PLACE 0
+    #define LINE_BYTE 0
     #define SLOPE(y, z, v) to_real(weigh(gather_words(from + ((y) * row + (z) * sheet + 2), at), 0, all) - weigh(gather_words(from + ((y) * row + (z) * sheet - 2), at), 0, all))
 #endif
     #define ROW(y, z) gather_words(from + ((y) * row + (z) * sheet), at)
-    #define LINE(v) WHOLE(weigh(v, LINE_PLACE, all))
+    #define LINE(v) WHOLE(weigh(v, LINE_BYTE, all))
     #define LERP(a, b, f) mad((b) - (a), f, a)
     Int va = ROW(0, 0), vb = ROW(1, 0), vc = ROW(0, 1), vd = ROW(1, 1);
     Real3 gradient;
@@ -191,13 +191,13 @@ static inline Real inner_gradient(constant const View *view, VOLUME voxels, Real
     Inner i = inner_at(p);
     Rows r;
     *gradient = inner_slopes(view, voxels, i, &r);
-    #define PAIR(row, weights) weigh(r.row, LINE_PLACE, weights)
+    #define PAIR(row, weights) weigh(r.row, LINE_BYTE, weights)
     return WHOLE((PAIR(here, i.near) + PAIR(below, i.next)) + (PAIR(behind, i.far) + PAIR(beyond, i.beyond)));
     #undef PAIR
 }
 #else
 #define INNER_UNIT 1.0f
-#define INNER_PLACES 1.0f
+#define INNER_SCALE 1.0f
 #define INNER_ROUNDING 0.0f
 
 static inline Real inner_raw(constant const View *view, VOLUME voxels, Real3 p) {
@@ -228,11 +228,11 @@ static inline Real3 inner_gradient_at(constant const View *view, VOLUME voxels, 
     return gradient;
 }
 
-// A place or a way in index units as inner_raw takes it: places count from the middle of voxel 0.
-static inline Real3 inner_way(Real3 way) { return scale3(way, (Real)(INNER_PLACES)); }
-static inline Real3 inner_place(Real3 p) {
-    Real3 place = inner_way(real3(p.x - 0.5f, p.y - 0.5f, p.z - 0.5f));
-    return real3(place.x + INNER_ROUNDING, place.y + INNER_ROUNDING, place.z + INNER_ROUNDING);
+// A displacement or a position in index units, scaled for inner_raw: positions count from the middle of voxel 0.
+static inline Real3 inner_way(Real3 way) { return scale3(way, (Real)(INNER_SCALE)); }
+static inline Real3 inner_position(Real3 p) {
+    Real3 position = inner_way(real3(p.x - 0.5f, p.y - 0.5f, p.z - 0.5f));
+    return real3(position.x + INNER_ROUNDING, position.y + INNER_ROUNDING, position.z + INNER_ROUNDING);
 }
 
 #endif

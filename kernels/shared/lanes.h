@@ -3,7 +3,7 @@
 //   Real, Int, UInt   one float, int, uint a lane
 //   Mask              an Int that is -1 (yes) or 0 (no) a lane; made by MASK(a < b), joined by & | ~
 //   Real3             three Reals; lane types have no vector form of their own
-//   any_lane(mask)    whether any lane says yes
+//   any_lane(mask)    true if any lane says yes
 // select(no, yes, mask) is OpenCL's own and means the same for LANES 1 and more.
 #ifndef SHARED_LANES_H
 #define SHARED_LANES_H
@@ -52,7 +52,7 @@ typedef struct { Real x, y, z; } Real3;
 #define LANE_IDS ((Int)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15))
 #endif
 
-// PoCL's any() of a long vector takes it apart lane by lane; as one instruction it makes a ray march a quarter faster.
+// PoCL's any() takes a long vector lane by lane; one instruction instead makes a ray march a quarter faster.
 #if LANES == 16 && defined(__AVX512DQ__) && __has_builtin(__builtin_ia32_cvtd2mask512)
 static inline int any_lane(Mask m) { return __builtin_ia32_cvtd2mask512(m) != 0; }
 #elif LANES == 8 && defined(__AVX2__) && __has_builtin(__builtin_ia32_movmskps256)
@@ -66,11 +66,11 @@ static inline int any_lane(Mask m) { return (m.x | m.y | m.z | m.w) != 0; }
 static inline int any_lane(Mask m) { return any(m); }
 #endif
 
-// The address of a lane's element when a vector has to be taken apart (scatter, atomics).
+// The address of a lane's element for access lane by lane (scatter, atomics).
 typedef union { Real v; float lane[LANES]; } RealLanes;
 typedef union { Int v; int lane[LANES]; } IntLanes;
 
-// How many lanes say yes.
+// The number of lanes that say yes.
 static inline int count_lanes(Mask m) {
 #if LANES == 1
     return m != 0;
@@ -255,7 +255,7 @@ static inline Real inverse_root(Real v) {
 static inline Real inverse_root(Real v) { return rsqrt(v); }
 #endif
 
-// 1 / v likewise, to a place or two of the last; of 0 it is not a number.
+// 1 / v likewise, to one or two units of the last digit; of 0 it is not a number.
 #if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_rcp14ps512_mask)
 static inline Real reciprocal(Real v) {
     Real r = __builtin_ia32_rcp14ps512_mask(v, (Real)(0.0f), (short)-1);
@@ -265,14 +265,14 @@ static inline Real reciprocal(Real v) {
 static inline Real reciprocal(Real v) { return 1.0f / v; }
 #endif
 
-// x^y for x in [0, 1] and y >= 1 by squares, from the highest binary place of y down; between whole numbers it is interpolated.
+// x^y for x in [0, 1] and y >= 1 by squares, from the highest bit of y down; between whole numbers it is interpolated.
 static inline Real power(Real x, float y) {
     uint whole = (uint)y;
     float part = y - (float)whole;
     Real result = x;
-    for (uint place = 0x40000000u >> clz(whole); place > 0u; place >>= 1) {
+    for (uint bit = 0x40000000u >> clz(whole); bit > 0u; bit >>= 1) {
         result *= result;
-        if (whole & place) result *= x;
+        if (whole & bit) result *= x;
     }
     return part > 0.0f ? result * mad((Real)(part), x - 1.0f, (Real)(1.0f)) : result;
 }

@@ -1,8 +1,8 @@
 // Lights of a scene: LIGHT_NUMBERS floats each in the table,
-//   kind, probability to be chosen, colour (3), place or direction towards it (3), radius or cosine (1), edges (3 + 3)
-//   LIGHT_SUN     irradiance of a face turned to it; direction; 1 - the cosine of its angular radius, 0 for a point at infinity
-//   LIGHT_POINT   intensity; place
-//   LIGHT_SPHERE  radiance of its outside; place, radius
+//   kind, probability to be chosen, colour (3), position or direction towards it (3), radius or cosine (1), edges (3 + 3)
+//   LIGHT_SUN     irradiance of a face towards it; direction; 1 - the cosine of its angular radius, 0 for a point at infinity
+//   LIGHT_POINT   intensity; position
+//   LIGHT_SPHERE  radiance of its outside; position, radius
 //   LIGHT_QUAD    radiance of both sides; corner, edges
 // and a sky that is between its zenith and its horizon. Lights do not hide each other, nor anything else.
 #ifndef SHARED_LIGHT_H
@@ -17,7 +17,7 @@
 static inline Real magnitude(Real3 c) { return fmax(fabs(c.x), fmax(fabs(c.y), fabs(c.z))); }
 static inline void add_light(Real3 *sum, Real3 light, Mask on) { *sum = select3(*sum, add3(*sum, light), on); }
 
-typedef struct { Int kind; Real chance; Real3 colour, place; Real size; Real3 u, v; } Light;
+typedef struct { Int kind; Real chance; Real3 colour, position; Real size; Real3 u, v; } Light;
 
 static inline Light light_of(constant const Scattering *params, global const float *table, Int which) {
     Light l;
@@ -26,13 +26,13 @@ static inline Light light_of(constant const Scattering *params, global const flo
     // One light needs no gathers.
     #define NUMBER(i) (params->lights == 1 ? (Real)(from[i]) : gather_reals(from + (i), at))
     l.kind = to_int(NUMBER(0)), l.chance = NUMBER(1);
-    l.colour = real3(NUMBER(2), NUMBER(3), NUMBER(4)), l.place = real3(NUMBER(5), NUMBER(6), NUMBER(7)), l.size = NUMBER(8);
+    l.colour = real3(NUMBER(2), NUMBER(3), NUMBER(4)), l.position = real3(NUMBER(5), NUMBER(6), NUMBER(7)), l.size = NUMBER(8);
     l.u = real3(NUMBER(9), NUMBER(10), NUMBER(11)), l.v = real3(NUMBER(12), NUMBER(13), NUMBER(14));
     #undef NUMBER
     return l;
 }
 
-// Which light the number u chooses.
+// The light that the number u chooses.
 static inline Int choose_light(constant const Scattering *params, global const float *table, Real u) {
     Int which = (Int)(0);
     float below = 0.0f;
@@ -61,9 +61,9 @@ typedef struct { Real3 d; Real length; Real3 light; Real density; } LightRay; //
 static inline LightRay light_ray(const Light *l, Real3 at, Real u, Real v) {
     LightRay ray;
     Mask sun = MASK(l->kind == LIGHT_SUN), sphere = MASK(l->kind == LIGHT_SPHERE), quad = MASK(l->kind == LIGHT_QUAD);
-    Real3 aim_at = l->place;
-    if (any_lane(quad)) aim_at = select3(aim_at, along(along(l->place, l->u, u), l->v, v), quad);
-    Real3 to = select3(minus3(aim_at, at), l->place, sun);
+    Real3 aim_at = l->position;
+    if (any_lane(quad)) aim_at = select3(aim_at, along(along(l->position, l->u, u), l->v, v), quad);
+    Real3 to = select3(minus3(aim_at, at), l->position, sun);
     Real squared = fmax(dot3(to, to), (Real)(1e-30f)), inverse = rsqrt(squared);
     ray.d = scale3(to, inverse);
     ray.length = select(squared * inverse, (Real)(1e30f), sun);
@@ -72,12 +72,12 @@ static inline LightRay light_ray(const Light *l, Real3 at, Real u, Real v) {
     Mask disc = sphere | (sun & MASK(l->size > 0.0f));
     if (any_lane(disc)) {
         Real cone = select(l->size, cone_of(l->size, squared), sphere), one_minus = u * cone;
-        ray.d = select3(ray.d, turned(ray.d, one_minus, 2.0f - one_minus, v), disc);
+        ray.d = select3(ray.d, rotate_direction(ray.d, one_minus, 2.0f - one_minus, v), disc);
         // A sun's irradiance is its radiance times pi sin^2 of its angular radius.
         Real radiance = select((Real)(1.0f), 1.0f / (0.5f * TURN * l->size * (2.0f - l->size)), sun);
         ray.density = select(ray.density, 1.0f / (TURN * cone), disc);
         ray.light = select3(ray.light, scale3(l->colour, radiance * TURN * cone), disc);
-        Real along_middle = dot3(minus3(l->place, at), ray.d), off2 = squared - along_middle * along_middle;
+        Real along_middle = dot3(minus3(l->position, at), ray.d), off2 = squared - along_middle * along_middle;
         Real half_chord = sqrt(fmax(l->size * l->size - off2, (Real)(0.0f)));
         ray.length = select(ray.length, fmax(along_middle - half_chord, (Real)(0.0f)), sphere);
         // Nothing shines inside a sphere.
@@ -92,7 +92,7 @@ static inline LightRay light_ray(const Light *l, Real3 at, Real u, Real v) {
     return ray;
 }
 
-// Light of what a ray from `at` meets between the lengths `from` and `to`, each weighed against the chance that its light was aimed at:
+// Light of the lights that a ray from `at` meets between the lengths `from` and `to`, each weighed against the chance that its light was aimed at:
 // the balance heuristic (Veach & Guibas, SIGGRAPH 1995), density / (density + chance * its own). No `weighed`: all of it. Where every
 // light is aimed at in its turn (`each`) the chance is 1.
 static inline Real3 met(constant const Scattering *params, global const float *table, Real3 at, Real3 d, Real from, Real to, Real density,
@@ -103,7 +103,7 @@ static inline Real3 met(constant const Scattering *params, global const float *t
         int kind = (int)l[0];
         Real own, length, radiance = (Real)(1.0f);
         Mask seen;
-        Real3 to_place = real3(l[5] - at.x, l[6] - at.y, l[7] - at.z);
+        Real3 to_light = real3(l[5] - at.x, l[6] - at.y, l[7] - at.z);
         if (kind == LIGHT_SUN) {
             if (!(l[8] > 0.0f)) continue;
             // |d - axis|^2 / 2 = 1 - cosine, without loss of digits for a small disc
@@ -113,8 +113,8 @@ static inline Real3 met(constant const Scattering *params, global const float *t
             own = (Real)(1.0f / (TURN * l[8]));
             radiance = (Real)(1.0f / (0.5f * TURN * l[8] * (2.0f - l[8])));
         } else if (kind == LIGHT_SPHERE) {
-            Real squared = dot3(to_place, to_place), along_d = dot3(to_place, d);
-            Real3 off = minus3(to_place, scale3(d, along_d));
+            Real squared = dot3(to_light, to_light), along_d = dot3(to_light, d);
+            Real3 off = minus3(to_light, scale3(d, along_d));
             Real chord2 = (Real)(l[8] * l[8]) - dot3(off, off);
             // A flight that began before `at` may have met it there.
             seen = MASK(chord2 > 0.0f) & (MASK(squared > l[8] * l[8]) | MASK(from < 0.0f));
@@ -123,8 +123,8 @@ static inline Real3 met(constant const Scattering *params, global const float *t
         } else if (kind == LIGHT_QUAD) {
             float3 u = (float3)(l[9], l[10], l[11]), v = (float3)(l[12], l[13], l[14]), n = cross(u, v);
             Real facing = mad(n.x, d.x, mad(n.y, d.y, n.z * d.z)), safe = select(facing, (Real)(1e-20f), MASK(fabs(facing) < 1e-20f));
-            length = mad(n.x, to_place.x, mad(n.y, to_place.y, n.z * to_place.z)) / safe;
-            Real3 on = minus3(scale3(d, length), to_place);
+            length = mad(n.x, to_light.x, mad(n.y, to_light.y, n.z * to_light.z)) / safe;
+            Real3 on = minus3(scale3(d, length), to_light);
             // Its two coordinates, by the edges' reciprocal ones.
             float area2 = dot(n, n);
             float3 ru = cross(v, n) / area2, rv = cross(n, u) / area2;

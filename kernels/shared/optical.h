@@ -1,5 +1,5 @@
-// The transfer function on the device: a table of colours and opacities by value, and behind it the few polynomials that take its place
-// where it is smooth but for some kinks.
+// The transfer function on the device: a table of colours and opacities by value, and behind it the few polynomials that replace it where it
+// is smooth but for some kinks.
 #ifndef SHARED_OPTICAL_H
 #define SHARED_OPTICAL_H
 
@@ -11,7 +11,7 @@
 typedef struct { Real3 colour; Real alpha; } Optical;
 
 // An entry of the table is two words: the opacity's float less its ten lowest bits, which hold the upper bits of blue, its two
-// lowest above (an opacity is at most 1); then 16 bits each of red and green, turned right by 25 and 9 bits.
+// lowest above (an opacity is at most 1); then 16 bits each of red and green, rotated right by 25 and 9 bits.
 typedef struct { Int word, red_green; } Entry;
 
 static inline Entry entry_at(global const uchar *table, Int index) {
@@ -31,30 +31,30 @@ static inline Optical optical(Entry e) {
     return o;
 }
 
-// Where a raw value in units of `unit` is in the table: entry i is at i. NaN where the value is.
-static inline Real place_of(constant const EmissionAbsorption *params, Real raw, float unit) {
+// The position of a raw value in units of `unit` in the table: entry i is at i. NaN where the value is.
+static inline Real table_position(constant const EmissionAbsorption *params, Real raw, float unit) {
     Real x = mad(raw, (Real)(params->table_scale * unit), (Real)(params->table_offset - 0.5f));
-    Real place = clamp(x, (Real)(0.0f), (Real)(TABLE_SIZE - 1));
+    Real position = clamp(x, (Real)(0.0f), (Real)(TABLE_SIZE - 1));
 #if VOXEL == VOXEL_F32
-    place = select(place, raw, MASK(raw != raw));
+    position = select(position, raw, MASK(raw != raw));
 #endif
-    return place;
+    return position;
 }
 
-// What follows the table of a function that is smooth but for some kinks: where its pieces begin, up to where each has no opacity,
-// and their polynomials, a cubic for the opacity and a line for each colour (src/technique/emission_absorption/pieces.rs).
+// Behind the table of a function that is smooth but for some kinks stand its pieces: their starts, the ends of their empty parts, and their
+// polynomials, a cubic for the opacity and a line for each colour (src/technique/emission_absorption/pieces.rs).
 #define PIECES 16
 typedef struct { float start[PIECES], empty[PIECES], opacity[4][PIECES], colour[3][2][PIECES]; } Pieces;
 
 #define PIECES_OF(table) ((global const Pieces *)((table) + 8 * TABLE_SIZE))
 
-// The piece that a place is on; -1 where there are none.
-static inline int piece_at(global const Pieces *t, float place) {
+// The piece that a position is on; -1 where there are none.
+static inline int piece_at(global const Pieces *t, float position) {
 #if LANES == 16
-    return count_lanes(MASK((Real)(place) >= *(global const Real *)t->start)) - 1;
+    return count_lanes(MASK((Real)(position) >= *(global const Real *)t->start)) - 1;
 #else
     int piece = -1;
-    while (piece < PIECES - 1 && place >= t->start[piece + 1]) piece++;
+    while (piece < PIECES - 1 && position >= t->start[piece + 1]) piece++;
     return piece;
 #endif
 }
@@ -77,14 +77,14 @@ static inline Span span_of(global const uchar *table, float least, float greates
 static inline int form_of(Span s) { return s.first < 0 ? ON_TABLE : s.first == s.last ? ON_PIECE : ON_PIECES; }
 
 #define POLYNOMIALS(PART)                                                                                                   \
-    Real x = place - PART(t->start);                                                                                        \
+    Real x = position - PART(t->start);                                                                                        \
     Real alpha = mad(mad(mad(PART(t->opacity[3]), x, PART(t->opacity[2])), x, PART(t->opacity[1])), x, PART(t->opacity[0])); \
     o.alpha = LESSER(alpha, (Real)(1.0f));                                                                                  \
     o.colour = real3(mad(PART(t->colour[0][1]), x, PART(t->colour[0][0])), mad(PART(t->colour[1][1]), x, PART(t->colour[1][0])), \
                      mad(PART(t->colour[2][1]), x, PART(t->colour[2][0])));
 
 // The transfer function where all lanes are on one piece.
-static inline Optical on_piece(global const Pieces *t, int piece, Real place) {
+static inline Optical on_piece(global const Pieces *t, int piece, Real position) {
     Optical o;
     #define PART(column) (Real)((column)[piece])
     POLYNOMIALS(PART)
@@ -93,35 +93,35 @@ static inline Optical on_piece(global const Pieces *t, int piece, Real place) {
 }
 
 // The same where they are on several.
-static inline Optical on_pieces(global const Pieces *t, Span s, Real place) {
+static inline Optical on_pieces(global const Pieces *t, Span s, Real position) {
 #if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_permvarsf512)
     Int piece = (Int)(s.first);
-    for (int i = s.first + 1; i <= s.last; i++) piece -= MASK(place >= t->start[i]);
+    for (int i = s.first + 1; i <= s.last; i++) piece -= MASK(position >= t->start[i]);
     Optical o;
     #define PART(column) __builtin_ia32_permvarsf512(*(global const Real *)(column), piece)
     POLYNOMIALS(PART)
     #undef PART
 #else
-    Optical o = on_piece(t, s.first, place);
+    Optical o = on_piece(t, s.first, position);
     for (int i = s.first + 1; i <= s.last; i++) {
-        Mask there = MASK(place >= t->start[i]);
-        Optical next = on_piece(t, i, place);
+        Mask there = MASK(position >= t->start[i]);
+        Optical next = on_piece(t, i, position);
         o.alpha = select(o.alpha, next.alpha, there), o.colour = select3(o.colour, next.colour, there);
     }
 #endif
     return o;
 }
 
-// The transfer function at places in the table, with the opacity of a whole step; a NaN is empty.
-static inline Optical optical_at(global const uchar *table, Span s, int form, Real place) {
+// The transfer function at positions in the table, with the opacity of a whole step; a NaN is empty.
+static inline Optical optical_at(global const uchar *table, Span s, int form, Real position) {
     Optical o;
 #if VOXEL == VOXEL_F32
-    Mask nan = MASK(place != place);
-    place = select(place, (Real)(0.0f), nan);
+    Mask nan = MASK(position != position);
+    position = select(position, (Real)(0.0f), nan);
 #endif
-    if (form == ON_PIECE) o = on_piece(PIECES_OF(table), s.first, place);
-    else if (form == ON_PIECES) o = on_pieces(PIECES_OF(table), s, place);
-    else o = optical(entry_at(table, to_int(place + 0.5f)));
+    if (form == ON_PIECE) o = on_piece(PIECES_OF(table), s.first, position);
+    else if (form == ON_PIECES) o = on_pieces(PIECES_OF(table), s, position);
+    else o = optical(entry_at(table, to_int(position + 0.5f)));
 #if VOXEL == VOXEL_F32
     o.alpha = select(o.alpha, (Real)(0.0f), nan);
 #endif
@@ -130,14 +130,14 @@ static inline Optical optical_at(global const uchar *table, Span s, int form, Re
 
 // The same at a raw value in units of `unit`.
 static inline Optical classify(constant const EmissionAbsorption *params, global const uchar *table, Real raw, float unit) {
-    Real place = place_of(params, raw, unit);
+    Real position = table_position(params, raw, unit);
 #if VOXEL == VOXEL_F32
-    Mask nan = MASK(place != place);
-    Span s = span_of(table, least_lane(select(place, (Real)(INFINITY), nan)), greatest_lane(select(place, (Real)(-INFINITY), nan)));
+    Mask nan = MASK(position != position);
+    Span s = span_of(table, least_lane(select(position, (Real)(INFINITY), nan)), greatest_lane(select(position, (Real)(-INFINITY), nan)));
 #else
-    Span s = span_of(table, least_lane(place), greatest_lane(place));
+    Span s = span_of(table, least_lane(position), greatest_lane(position));
 #endif
-    return optical_at(table, s, form_of(s), place);
+    return optical_at(table, s, form_of(s), position);
 }
 
 #endif

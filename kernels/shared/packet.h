@@ -21,7 +21,7 @@
 #define BEAM_H 2
 #endif
 #define PACKETS (BEAM_W * BEAM_H)
-// Samples between two looks at the cells and at which packets are still going.
+// Samples between two checks of the cells and of the packets that go on.
 #define STRIDE 8
 
 typedef struct {
@@ -43,12 +43,12 @@ typedef struct {
 
 typedef struct {
     float origin[3], direction[3]; // middle of the samples of step k: origin + direction (k h), index units
-    float reach[3];                // no sample of any lane is further from it
+    float half_width[3];           // no sample of any lane is further from it
     float steps[3];                // that it takes for a voxel along the axis
     int begin, end;                // steps in which any lane has a sample
 } Beam;
 
-// How many beams the pass has.
+// The number of beams of the pass.
 static inline int beams(constant const View *view) {
     int w = TILE_W * BEAM_W, h = TILE_H * BEAM_H;
     return ((view->width + w - 1) / w) * ((view->height + h - 1) / h);
@@ -63,9 +63,9 @@ static inline void narrow_range(constant const View *view, Packet *p) {
         {                                                                                                                  \
             Real a = p->start.c + p->pace.c * from, b = a + p->pace.c * steps;                                             \
             float low_a = least_lane(a), low_b = least_lane(b), wide_a = greatest_lane(a) - low_a, wide_b = greatest_lane(b) - low_b; \
-            float spare = NARROW * INNER_PLACES - wide_a, growth = (wide_b - wide_a) / steps;                              \
-            pace[i] = (low_b - low_a) / (steps * INNER_PLACES);                                                            \
-            low[i] = low_a / INNER_PLACES - pace[i] * from - 0.01f;                                                        \
+            float spare = NARROW * INNER_SCALE - wide_a, growth = (wide_b - wide_a) / steps;                              \
+            pace[i] = (low_b - low_a) / (steps * INNER_SCALE);                                                            \
+            low[i] = low_a / INNER_SCALE - pace[i] * from - 0.01f;                                                        \
             room = spare < 0.0f ? 0.0f : growth * room > spare ? spare / growth : room;                                    \
         }
     AXIS(0, x)
@@ -90,7 +90,7 @@ static inline Packet packet_at(constant const View *view, int left, int top, flo
     p.x = to_real(column) + view->offset[0];
     p.y = to_real(row) + view->offset[1];
     p.ray = camera_ray(view, p.x, p.y);
-    p.start = inner_place(along(p.ray.origin, p.ray.direction, p.jitter * view->step));
+    p.start = inner_position(along(p.ray.origin, p.ray.direction, p.jitter * view->step));
     p.pace = inner_way(scale3(p.ray.direction, (Real)(view->step)));
     Ray inner = p.ray;
     clip_box(view, margin, &inner);
@@ -120,18 +120,18 @@ static inline Beam beam_at(constant const View *view, int number, float margin, 
     b.begin = (int)floor(near / view->step);
     b.end = (int)ceil(far / view->step);
     RealLanes v;
-    Real apart;
+    Real farthest;
     #define MIDDLE(to, first, last) v.v = 0.5f * (first + last); to = 0.5f * (v.lane[0] + v.lane[LANES - 1])
     // A sample lies anywhere in its step; the middle of the step stands for it.
     #define AXIS(i, c)                                                                                                     \
         MIDDLE(b.direction[i], packets[0].ray.direction.c, packets[PACKETS - 1].ray.direction.c);                          \
         MIDDLE(b.origin[i], packets[0].ray.origin.c, packets[PACKETS - 1].ray.origin.c);                                   \
-        apart = (Real)(0.0f);                                                                                              \
+        farthest = (Real)(0.0f);                                                                                              \
         for (int j = 0; j < PACKETS; j++) {                                                                                \
             Real o = packets[j].ray.origin.c - b.origin[i], d = packets[j].ray.direction.c - b.direction[i];               \
-            apart = fmax(apart, fmax(fabs(o + d * (near - view->step)), fabs(o + d * (far + view->step))));                \
+            farthest = fmax(farthest, fmax(fabs(o + d * (near - view->step)), fabs(o + d * (far + view->step))));                \
         }                                                                                                                  \
-        b.reach[i] = greatest_lane(apart) + 0.505f * fabs(b.direction[i]) * view->step + 0.01f;                            \
+        b.half_width[i] = greatest_lane(farthest) + 0.505f * fabs(b.direction[i]) * view->step + 0.01f;                            \
         b.origin[i] += b.direction[i] * 0.5f * view->step;                                                                 \
         b.steps[i] = 1.0f / fmax(fabs(b.direction[i]) * view->step, 1e-12f);
     AXIS(0, x)
@@ -153,7 +153,7 @@ static inline int beam_leap(constant const View *view, const Beam *b, global con
     int4 cell = clamp(convert_int4(here * (1.0f / CELL)), 0, count - 1);
     int distance = distances[(cell.z * count.y + cell.y) * count.x + cell.x];
 #if TAPS == 4 || STYLED
-    // A cubic reads a voxel further than the cells look.
+    // A cubic reads a voxel beyond the cells' ranges.
     distance -= 1;
 #endif
     if (distance <= 0) return 0;
@@ -161,7 +161,7 @@ static inline int beam_leap(constant const View *view, const Beam *b, global con
     int4 first = cell - distance + 1, last = cell + distance;
     float4 low = select(convert_float4(first * CELL), (float4)(-1e8f), first <= 0);
     float4 high = select(convert_float4(last * CELL), (float4)(1e8f), last >= count);
-    float4 back = here - FLOATS(b->reach) - low, ahead = high - here - FLOATS(b->reach);
+    float4 back = here - FLOATS(b->half_width) - low, ahead = high - here - FLOATS(b->half_width);
     float4 least = fmin(back, ahead), room = select(back, ahead, FLOATS(b->direction) > 0.0f) * FLOATS(b->steps);
     if (fmin(least.x, fmin(least.y, least.z)) < 0.0f) return 0;
     return (int)fmin(fmin(room.x, 1e8f), fmin(room.y, room.z));
@@ -169,12 +169,12 @@ static inline int beam_leap(constant const View *view, const Beam *b, global con
 
 // The raw value at the sample of a step that is whole in every lane: inner <= k < inner_end.
 static inline __attribute__((always_inline)) Real whole_step_raw(constant const View *view, VOLUME voxels, const Packet *p, int k) {
-    Real3 place = along(p->start, p->pace, (Real)((float)k));
+    Real3 position = along(p->start, p->pace, (Real)((float)k));
     // A block for one step pays where a register holds it.
 #if defined(NARROW) && LANES == 16 && VOXEL == VOXEL_U8
-    if (k < p->narrow_end) return narrow_raw(view, voxels, place, p->low + p->low_pace * (float)k) * INNER_UNIT;
+    if (k < p->narrow_end) return narrow_raw(view, voxels, position, p->low + p->low_pace * (float)k) * INNER_UNIT;
 #endif
-    return inner_raw(view, voxels, place) * INNER_UNIT;
+    return inner_raw(view, voxels, position) * INNER_UNIT;
 }
 
 // The raw values in units of INNER_UNIT at the samples of the steps from k to end - 1, at most STRIDE, which are whole in every
@@ -183,16 +183,16 @@ static inline void whole_steps_raw(constant const View *view, VOLUME voxels, con
     int i = 0;
 #ifdef NARROW
     if (k < p->narrow_end) {
-        BlockPlaces places = block_places(view, p->low + p->low_pace * (float)k, p->low_pace);
+        BlockOffsets offsets = block_offsets(view, p->low + p->low_pace * (float)k, p->low_pace);
 #if INNER_WHOLE
         Fixed3 at = fixed3(along(p->start, p->pace, (Real)((float)k))), pace = fixed3_nearest(p->pace);
         for (; i < min(end, p->narrow_end) - k; i++, at = add_fixed3(at, pace)) {
-            Block block = block_at(view, voxels, &places, i);
+            Block block = block_at(view, voxels, &offsets, i);
             raw[i] = block_raw(&block, inner_of(at));
         }
 #else
         for (; i < min(end, p->narrow_end) - k; i++) {
-            Block block = block_at(view, voxels, &places, i);
+            Block block = block_at(view, voxels, &offsets, i);
             raw[i] = block_raw(&block, along(p->start, p->pace, (Real)((float)(k + i))));
         }
 #endif

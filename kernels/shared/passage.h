@@ -1,15 +1,15 @@
-// Walls: how far ahead they are, and what becomes of photons that have come to one.
+// Cell boundaries: the distances to them (DDA), and the passage of photons through them.
 #ifndef SHARED_PASSAGE_H
 #define SHARED_PASSAGE_H
 
+#include "shared/dda.h"
 #include "shared/fresnel.h"
 #include "shared/lanes.h"
 #include "shared/medium.h"
 #include "shared/photon.h"
 #include "shared/tally.h"
-#include "shared/walls.h"
 
-// Counts what leaves the box by a face, by its radius from the beam's axis and its angle to the face.
+// Counts photons that leave the box by a face, by its radius from the beam's axis and its angle to the face.
 static inline void leave(constant const PhotonTransport *params, global const float *table, global ulong *ledger, Gains *gains,
                          const Photon *photon, int axis, Mask up, Mask gone) {
     gain(&gains->sums[LEDGER_EXIT_MINUS_X + 2 * axis], photon->weight, gone & ~up);
@@ -30,24 +30,24 @@ static inline void leave(constant const PhotonTransport *params, global const fl
     tally(ledger, LEDGER_LENGTH + (side * params->radius_bins + ring) * params->angle_bins + cone, photon->weight, binned);
 }
 
-// Takes photons over a wall across one axis, or back from it; returns those that left the box.
-static inline Mask cross_wall(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table,
-                              global ulong *ledger, Gains *gains, int axis, Real wall, Mask in, Photon *photon) {
+// Takes photons over a boundary across one axis, or back from it. Returns those that left the box.
+static inline Mask cross_on_axis(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table,
+                              global ulong *ledger, Gains *gains, int axis, Real boundary, Mask in, Photon *photon) {
     Real d = axis == 0 ? photon->d.x : axis == 1 ? photon->d.y : photon->d.z;
     Int here = axis == 0 ? photon->cell.x : axis == 1 ? photon->cell.y : photon->cell.z;
     Mask up = MASK(d > 0.0f), back = (Mask)(0);
     Int next = here + select((Int)(-1), (Int)(1), up);
-    Mask out = in & (MASK(next < 0) | MASK(next >= params->walls[axis]));
-    Real place = wall;
+    Mask out = in & (MASK(next < 0) | MASK(next >= params->cells[axis]));
+    Real position = boundary;
     if (params->boundary[axis] == BOUNDARY_MIRROR) back = out;
     if (params->boundary[axis] == BOUNDARY_CYCLIC) {
-        next = select(next, select((Int)(params->walls[axis] - 1), (Int)(0), up), out);
-        place = select(place, select((Real)(params->high_mm[axis]), (Real)(params->low_mm[axis]), up), out);
+        next = select(next, select((Int)(params->cells[axis] - 1), (Int)(0), up), out);
+        position = select(position, select((Real)(params->high_mm[axis]), (Real)(params->low_mm[axis]), up), out);
     }
     if (params->boundary[axis] != BOUNDARY_ABSORBING) out = (Mask)(0);
     if ((params->fresnel && any_lane(out)) || params->mismatch) {
         Cell ahead = photon->cell;
-        Int inside = clamp(next, (Int)(0), (Int)(params->walls[axis] - 1));
+        Int inside = clamp(next, (Int)(0), (Int)(params->cells[axis] - 1));
         if (axis == 0) ahead.x = inside;
         if (axis == 1) ahead.y = inside;
         if (axis == 2) ahead.z = inside;
@@ -67,11 +67,11 @@ static inline Mask cross_wall(constant const FieldPass *pass, constant const Pho
             back |= returns;
         }
     }
-    // What is sent back has not come to the other side.
-    place = select(place, wall, back);
-    if (axis == 0) photon->p.x = select(photon->p.x, place, in);
-    if (axis == 1) photon->p.y = select(photon->p.y, place, in);
-    if (axis == 2) photon->p.z = select(photon->p.z, place, in);
+    // A photon that is sent back stays on this side.
+    position = select(position, boundary, back);
+    if (axis == 0) photon->p.x = select(photon->p.x, position, in);
+    if (axis == 1) photon->p.y = select(photon->p.y, position, in);
+    if (axis == 2) photon->p.z = select(photon->p.z, position, in);
     if (axis == 0) photon->d.x = select(photon->d.x, -photon->d.x, back);
     if (axis == 1) photon->d.y = select(photon->d.y, -photon->d.y, back);
     if (axis == 2) photon->d.z = select(photon->d.z, -photon->d.z, back);
@@ -83,16 +83,16 @@ static inline Mask cross_wall(constant const FieldPass *pass, constant const Pho
     return gone;
 }
 
-// The walls around a photon: where they are, how far along its way, and the cells before them.
-typedef struct { Real3 wall, distance; Real nearest; Cell last; Mask up_x, up_y, up_z; } Ahead;
+// The boundaries ahead of a photon: their positions, the distances to them along its way, and the cells before them.
+typedef struct { Real3 boundary, distance; Real nearest; Cell last; Mask up_x, up_y, up_z; } Ahead;
 
-static inline Ahead look_ahead(constant const PhotonTransport *params, global const float *table, const Photon *photon) {
+static inline Ahead boundaries_ahead(constant const PhotonTransport *params, global const float *table, const Photon *photon) {
     Ahead a;
     #define AXIS(i, c)                                                                                                     \
         a.up_##c = MASK(photon->d.c > 0.0f);                                                                               \
-        a.last.c = cell_ahead(params, i, photon->cell.c, photon->reach, a.up_##c);                                         \
-        a.wall.c = wall_ahead(params, table, i, a.last.c, a.up_##c);                                                       \
-        a.distance.c = distance_to(a.wall.c, photon->p.c, photon->d.c);
+        a.last.c = cell_ahead(params, i, photon->cell.c, photon->clearance, a.up_##c);                                         \
+        a.boundary.c = boundary_ahead(params, table, i, a.last.c, a.up_##c);                                                       \
+        a.distance.c = distance_to(a.boundary.c, photon->p.c, photon->d.c);
     AXIS(0, x)
     AXIS(1, y)
     AXIS(2, z)
@@ -101,38 +101,38 @@ static inline Ahead look_ahead(constant const PhotonTransport *params, global co
     return a;
 }
 
-// Takes photons over a wall across one axis behind which there are more cells, and where no light is bent. Returns those of which this
-// is not so, or not known.
-static inline Mask cross_inner(constant const PhotonTransport *params, int axis, Real wall, Mask up, Mask in, Real *p, Int *cell) {
+// Takes photons over a boundary across one axis, if there are more cells behind it and no light is bent. Returns those that it leaves to
+// cross_on_axis.
+static inline Mask cross_inner(constant const PhotonTransport *params, int axis, Real boundary, Mask up, Mask in, Real *p, Int *cell) {
     if (params->mismatch) return in;
     Int next = *cell + select((Int)(-1), (Int)(1), up);
-    Mask moves = in & MASK(next >= 0) & MASK(next < params->walls[axis]);
-    *p = select(*p, wall, moves);
+    Mask moves = in & MASK(next >= 0) & MASK(next < params->cells[axis]);
+    *p = select(*p, boundary, moves);
     *cell = select(*cell, next, moves);
     return in & ~moves;
 }
 
-// Takes photons that have come to their nearest wall over it; returns those that left the box.
+// Takes photons over their nearest boundary. Returns those that left the box.
 static inline Mask cross(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table, global ulong *ledger,
                          Gains *gains, const Ahead *a, Mask crosses, Photon *photon) {
     Mask gone = (Mask)(0), in_x = crosses & MASK(a->distance.x == a->nearest);
     Mask in_y = crosses & ~in_x & MASK(a->distance.y == a->nearest), in_z = crosses & ~in_x & ~in_y;
-#if REACHES
-    Cell here = cell_within(params, photon->cell, photon->reach, photon->p);
+#if HAS_CLEARANCE
+    Cell here = cell_within(params, photon->cell, photon->clearance, photon->p);
     photon->cell.x = select(photon->cell.x, select(here.x, a->last.x, in_x), crosses);
     photon->cell.y = select(photon->cell.y, select(here.y, a->last.y, in_y), crosses);
     photon->cell.z = select(photon->cell.z, select(here.z, a->last.z, in_z), crosses);
 #endif
-#if VOXEL_WALLS || BLOCK_WALLS
-    in_x = cross_inner(params, 0, a->wall.x, a->up_x, in_x, &photon->p.x, &photon->cell.x);
-    in_y = cross_inner(params, 1, a->wall.y, a->up_y, in_y, &photon->p.y, &photon->cell.y);
-    in_z = cross_inner(params, 2, a->wall.z, a->up_z, in_z, &photon->p.z, &photon->cell.z);
+#if VOXEL_CELLS || BLOCK_CELLS
+    in_x = cross_inner(params, 0, a->boundary.x, a->up_x, in_x, &photon->p.x, &photon->cell.x);
+    in_y = cross_inner(params, 1, a->boundary.y, a->up_y, in_y, &photon->p.y, &photon->cell.y);
+    in_z = cross_inner(params, 2, a->boundary.z, a->up_z, in_z, &photon->p.z, &photon->cell.z);
 #endif
-    if (any_lane(in_x)) gone |= cross_wall(pass, params, table, ledger, gains, 0, a->wall.x, in_x, photon);
-    if (any_lane(in_y)) gone |= cross_wall(pass, params, table, ledger, gains, 1, a->wall.y, in_y, photon);
-    if (any_lane(in_z)) gone |= cross_wall(pass, params, table, ledger, gains, 2, a->wall.z, in_z, photon);
-#if REACHES
-    look_around(params, table, crosses, photon);
+    if (any_lane(in_x)) gone |= cross_on_axis(pass, params, table, ledger, gains, 0, a->boundary.x, in_x, photon);
+    if (any_lane(in_y)) gone |= cross_on_axis(pass, params, table, ledger, gains, 1, a->boundary.y, in_y, photon);
+    if (any_lane(in_z)) gone |= cross_on_axis(pass, params, table, ledger, gains, 2, a->boundary.z, in_z, photon);
+#if HAS_CLEARANCE
+    update_clearance(params, table, crosses, photon);
 #endif
     return gone;
 }

@@ -23,9 +23,9 @@ static inline void turn(Real v, Real *sine, Real *cosine) {
     *cosine = select(b, -b, MASK(((q + 1) & 2) != 0));
 }
 
-// The direction d (unit length) turned by the angle of 1 - cosine and 1 + cosine, and about itself by the fraction v of a turn. The
+// Rotates the direction d (unit length) by the angle of 1 - cosine and 1 + cosine, and about itself by the fraction v of a turn. The
 // frame is Duff et al.'s ("Building an Orthonormal Basis, Revisited", JCGT 6(1), 2017).
-static inline Real3 turned(Real3 d, Real one_minus, Real one_plus, Real v) {
+static inline Real3 rotate_direction(Real3 d, Real one_minus, Real one_plus, Real v) {
     Real sine, cosine;
     turn(v, &sine, &cosine);
     Real away2 = fmax(one_minus * one_plus, (Real)(1e-30f)), away = away2 * inverse_root(away2), along_d = 1.0f - one_minus, u = away * cosine, w = away * sine;

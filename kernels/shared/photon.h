@@ -1,19 +1,19 @@
-// A packet of photons: one a lane. Places and ways are in mm from the box's corner.
+// A packet of photons: one a lane. Positions are in mm from the box's corner.
 #ifndef SHARED_PHOTON_H
 #define SHARED_PHOTON_H
 
+#include "shared/dda.h"
 #include "shared/fresnel.h"
 #include "shared/lanes.h"
 #include "shared/medium.h"
 #include "shared/phase.h"
 #include "shared/rng.h"
 #include "shared/tally.h"
-#include "shared/walls.h"
 
 typedef struct {
     Real3 p, d;          // d of unit length
     Cell cell;
-    Int medium, reach;   // with REACHES: of the cell
+    Int medium, clearance;   // of the cell, with HAS_CLEARANCE
     Real weight;
     Real depth;          // what is left of the free path, in optical depth
     Real optical;        // path times refractive index so far
@@ -23,15 +23,15 @@ typedef struct {
     Int scatterings;
 } Photon;
 
-#if REACHES
-// Looks where photons have come to.
-static inline void look_around(constant const PhotonTransport *params, global const float *table, Mask moved, Photon *photon) {
-    Int reach, medium = medium_and_reach(params, table, photon->cell, moved, &reach);
-    photon->medium = select(photon->medium, medium, moved), photon->reach = select(photon->reach, reach, moved);
+#if HAS_CLEARANCE
+// Reads the medium and clearance of the cells that photons have come to.
+static inline void update_clearance(constant const PhotonTransport *params, global const float *table, Mask moved, Photon *photon) {
+    Int clearance, medium = medium_and_clearance(params, table, photon->cell, moved, &clearance);
+    photon->medium = select(photon->medium, medium, moved), photon->clearance = select(photon->clearance, clearance, moved);
 }
 #endif
 
-// What the numbers of an event are drawn by; `what` tells the draws of one event apart.
+// The counter of an event's random numbers; `what` numbers the draws of one event.
 static inline UInt4Lanes counter(constant const FieldPass *pass, const Photon *photon, uint what) {
     UInt low = pass->first[0] + photon->number;
     UInt high = pass->first[1] + as_UInt(select((Int)(0), (Int)(1), MASK(low < pass->first[0])));
@@ -84,7 +84,7 @@ static inline void gain_path(constant const PhotonTransport *params, const Photo
     gains->path = add_ulong(gains->path, ulong_rounded(path));
 }
 
-// Where and whither a source sends the photon.
+// Samples the position and direction of a new photon.
 static inline void launch(constant const FieldPass *pass, constant const PhotonTransport *params, Photon *photon) {
     UInt4Lanes r = draw(pass, photon, 0);
     constant const float *at = params->source, *axis = params->source_axis;
@@ -94,11 +94,11 @@ static inline void launch(constant const FieldPass *pass, constant const PhotonT
     Real u = unit_open(r.a), v = unit_open(r.b);
     if (params->source_type == SOURCE_ISOTROPIC || params->source_type == SOURCE_CONE) {
         Real one_minus = u * (1.0f - params->source_cos_from);
-        photon->d = turned(photon->d, one_minus, 2.0f - one_minus, v);
+        photon->d = rotate_direction(photon->d, one_minus, 2.0f - one_minus, v);
     }
     if (params->source_type == SOURCE_DIFFUSE) {
         Real cosine = sqrt(u);
-        photon->d = turned(photon->d, 1.0f - cosine, 1.0f + cosine, v);
+        photon->d = rotate_direction(photon->d, 1.0f - cosine, 1.0f + cosine, v);
     }
     if (params->source_type == SOURCE_PLANAR || params->source_type == SOURCE_DISK || params->source_type == SOURCE_DIFFUSE) {
         UInt4Lanes s = draw(pass, photon, 1);

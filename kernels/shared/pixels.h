@@ -39,10 +39,10 @@ static inline Real load_reals(global const float *from, int pixel) {
 #endif
 }
 
-// What is finite; an m2 is never negative.
+// The finite ones; an m2 is never negative.
 static inline Mask known(Real m2) { return MASK(m2 <= FLT_MAX); }
 
-// sRGB of linear values, by a table of 2^16 steps from 0 to 1 (`curve` of src/device/develop.rs); no number is 0.
+// sRGB of linear values, by a table of 2^16 steps from 0 to 1 (`curve` of src/device/encode.rs); no number is 0.
 static inline Int srgb(global const uchar *curve, Real v) {
 #pragma OPENCL FP_CONTRACT OFF
     v = v > 0.0f ? v : (Real)(0.0f);
@@ -51,7 +51,7 @@ static inline Int srgb(global const uchar *curve, Real v) {
     return gather_words(curve, to_int(scaled + 0.5f)) & 255;
 }
 
-// How many of `lanes` have a value above white.
+// The number of values above white in `lanes`.
 static inline int count_clipped(Real3 c, Mask lanes) {
     return count_lanes(MASK(c.x > 1.0f) & lanes) + count_lanes(MASK(c.y > 1.0f) & lanes) + count_lanes(MASK(c.z > 1.0f) & lanes);
 }
@@ -62,7 +62,7 @@ typedef struct __attribute__((packed)) { uint2 words; } Unaligned8;
 typedef struct __attribute__((packed)) { uint word; } Unaligned4;
 
 // Writes the bytes of pixels of a row, of which `inside` are the picture's.
-static inline void store_bytes(constant Develop *d, global uchar *picture, int at, int inside, Int bytes) {
+static inline void store_bytes(constant Encode *d, global uchar *picture, int at, int inside, Int bytes) {
     ByteLanes lanes;
     lanes.v = bytes;
 #if LANES > 1
@@ -93,7 +93,7 @@ static inline void store_bytes(constant Develop *d, global uchar *picture, int a
 
 // The bytes of pixels: three each over the background, or four with an alpha that is not multiplied into them. Adds to `clipped` how many
 // values of `lanes` were.
-static inline Int picture_bytes(constant Develop *d, global const uchar *curve, Real3 colour, Real alpha, Mask lanes, int *clipped) {
+static inline Int picture_bytes(constant Encode *d, global const uchar *curve, Real3 colour, Real alpha, Mask lanes, int *clipped) {
 #pragma OPENCL FP_CONTRACT OFF
     Int last = (Int)(0);
     if (d->transparent) {

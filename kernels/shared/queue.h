@@ -1,4 +1,4 @@
-// Which photons a work-item launches, and when: a lane whose photon has ended takes the next one.
+// The queue of photons that a work-item launches: a lane whose photon has ended takes the next one.
 #ifndef SHARED_QUEUE_H
 #define SHARED_QUEUE_H
 
@@ -11,7 +11,7 @@ typedef struct {
     long launched, passed; // photons so far, and steps of all lanes
 } Queue;
 
-// Where the share of photons ends that begins with that one.
+// The end of the share that begins with that photon.
 static inline uint share_end(constant const FieldPass *pass, uint first) { return first + min(pass->count - first, pass->per_item); }
 
 // A work-item has one share; with a grid of its own it takes one after the other until there are none.
@@ -39,12 +39,12 @@ static inline int is_launch_due(int free, const Queue *q) {
 
 // Gives each free lane the number of the next photon, in the lanes' order. Returns the lanes that have one.
 static inline Mask take_photons(Mask alive, Queue *q, UInt *number) {
-    IntLanes free, place;
+    IntLanes free, rank;
     free.v = ~alive;
     int left = (int)(q->end - q->next), given = 0;
-    for (int i = 0; i < LANES; i++) place.lane[i] = given, given -= free.lane[i];
-    Mask fresh = ~alive & MASK(place.v < left);
-    *number = as_UInt(place.v) + q->next;
+    for (int i = 0; i < LANES; i++) rank.lane[i] = given, given -= free.lane[i];
+    Mask fresh = ~alive & MASK(rank.v < left);
+    *number = as_UInt(rank.v) + q->next;
     given = min(given, left), q->next += (uint)given, q->launched += given;
     return fresh;
 }

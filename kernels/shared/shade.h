@@ -13,8 +13,7 @@ static inline Real3 gradient_world(constant const View *view, Real3 g) {
                  mad(m[6], g.x, mad(m[7], g.y, m[8] * g.z)));
 }
 
-// What is constant along a ray of unit direction `ray`: for each light the unit vector half way to it, as a covector in index units,
-// whose product with a gradient in index units is that of the vectors in the world.
+// Constants along a ray of unit direction `ray`: for each light the unit half vector, as a covector in index units, whose product with a gradient in index units is that of the vectors in the world.
 static inline void half_ways(constant const View *view, Real3 ray, Real3 half_way[MAX_LIGHTS]) {
     constant const float *m = view->world_gradient_from_index;
     for (int i = 0; i < view->lights; i++) {

@@ -1,4 +1,4 @@
-// What a sample looks like beyond its transfer function: opacity by gradient and by angle, colour by curvature, light by tone
+// Styles of samples beyond the transfer function: opacity by gradient and by angle, colour by curvature, light by tone
 // and through thin tissue. All of it is per sample, so it holds for any interpolation.
 #ifndef SHARED_STYLE_H
 #define SHARED_STYLE_H
@@ -33,14 +33,14 @@ static inline Surface surface_at(constant const View *view, constant const Emiss
     return s;
 }
 
-// How many times the transfer function's extinction the sample has: by |gradient| over the reference (Levoy, IEEE CG&A 8(3),
+// The factor of the transfer function's extinction: by |gradient| over the reference (Levoy, IEEE CG&A 8(3),
 // 1988), and at silhouettes by base + gain (1 - |n . v|)^exponent (Ebert & Rheingans, IEEE Visualization 2000).
 static inline Real extinction_factor(constant const EmissionAbsorption *params, const Surface *s) {
     Real factor = (Real)(1.0f);
     if (params->gradient_gain > 0.0f) factor = s->magnitude * params->gradient_gain;
     if (params->silhouette_gain > 0.0f) {
-        Real turned = select(1.0f - s->facing, (Real)(0.0f), s->flat);
-        Real edge = exp2(params->silhouette_exponent * log2(fmax(turned, (Real)(1e-6f))));
+        Real edge_on = select(1.0f - s->facing, (Real)(0.0f), s->flat);
+        Real edge = exp2(params->silhouette_exponent * log2(fmax(edge_on, (Real)(1e-6f))));
         factor *= mad(edge, (Real)(params->silhouette_gain), (Real)(params->silhouette_base));
     }
     return factor;
@@ -92,9 +92,9 @@ static inline Real3 shade_translucent(constant const View *view, constant const 
         Real along_half = clamp(dot3(n, h) * rsqrt(fmax(dot3(h, h), (Real)(1e-12f))), (Real)(1e-6f), (Real)(1.0f));
         Real exponent = select((Real)(view->shininess), (Real)(params->translucency_exponent), behind);
         Real share = select((Real)(1.0f - params->translucency), (Real)(params->translucency), behind);
-        Real turned = share * select(fabs(facing), (Real)(1.0f), s->flat);
+        Real diffuse = share * select(fabs(facing), (Real)(1.0f), s->flat);
         Real glint = select(share * exp2(exponent * log2(along_half)), (Real)(0.0f), s->flat);
-        body = real3(mad(turned, lambert[0], body.x), mad(turned, lambert[1], body.y), mad(turned, lambert[2], body.z));
+        body = real3(mad(diffuse, lambert[0], body.x), mad(diffuse, lambert[1], body.y), mad(diffuse, lambert[2], body.z));
         shine = real3(mad(glint, highlight[0], shine.x), mad(glint, highlight[1], shine.y), mad(glint, highlight[2], shine.z));
     }
     return real3(mad(colour.x, body.x, shine.x), mad(colour.y, body.y, shine.y), mad(colour.z, body.z, shine.z));

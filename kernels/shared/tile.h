@@ -1,5 +1,5 @@
-// Pictures are sampled by tiles of TILE x TILE pixels, one a work-item, where a lane whose pixel is through takes the next one of the tile;
-// with one lane a work-item is one of a tile's pixels. `tiles` says which: how many, the number of their next sample, and whether a list
+// Pictures are sampled by tiles of TILE x TILE pixels, one a work-item: a lane whose pixel is done takes the next one of the tile. With one
+// lane a work-item is one of a tile's pixels. `tiles` says which: how many, the number of their next sample, and whether a list
 // follows instead: for each the tile, the number of its next sample, and how many it gets. Behind room for all of them stands what each
 // tile has cost so far, in steps of its packets.
 #ifndef SHARED_TILE_H
@@ -20,7 +20,7 @@
 
 typedef struct { int left, top; uint sample, times, cost_at; } Tile;
 
-// What the work-item renders; no times past the end of the pass.
+// The tile or pixel of the work-item; `times` is 0 past the end of the pass.
 static inline Tile tile_at(constant const View *view, global const uint *tiles) {
     uint number = (uint)view->first_beam + (uint)get_global_id(0), entry = number / ITEMS, part = number % ITEMS;
     Tile t;
@@ -39,16 +39,16 @@ static inline void cost(global uint *tiles, Tile tile, uint steps) {
     if (tile.times > 0u) atomic_add(&tiles[tile.cost_at], steps);
 }
 
-// Where in its pixel a sample goes through: `place_in_pixel` of src/job/places.rs, which says why.
-static inline float2 place_in_pixel(uint sample) {
+// The offset of a sample in its pixel: `place_in_pixel` of src/job/places.rs, which says why.
+static inline float2 sample_offset(uint sample) {
     if (sample < 4u) {
         float angle = 0.2617994f + 2.0943951f * (float)sample;
         return 0.5f + (sample ? 0.4714045f : 0.0f) * (float2)(cos(angle), sin(angle));
     }
     float u = ((float)((sample / 4u * 0xc13fa9a9u) >> 9) + 0.5f) * 0x1p-24f - 0.5f;
     float v = ((float)((sample / 4u * 0x91e10da6u) >> 9) + 0.5f) * 0x1p-24f - 0.5f;
-    float2 turned = sample % 4u < 2u ? (float2)(u, v) : (float2)(-v, u);
-    return 0.5f + (sample % 2u ? -turned : turned);
+    float2 rotated = sample % 4u < 2u ? (float2)(u, v) : (float2)(-v, u);
+    return 0.5f + (sample % 2u ? -rotated : rotated);
 }
 
 // Gives the free lanes the next pixels of the tile, from `taken` on. Returns the lanes that have a new one.

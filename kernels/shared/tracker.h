@@ -7,22 +7,22 @@
 #ifndef SHARED_TRACKER_H
 #define SHARED_TRACKER_H
 
+#include "shared/dda.h"
 #include "shared/flight.h"
 #include "shared/lanes.h"
 #include "shared/rng.h"
 #include "shared/volume.h"
-#include "shared/walls.h"
 
 // Transmittances below this meet the roulette.
 #define FAINT 0.05f
 
 #if DENSITY == DENSITY_CONSTANT
-// What of each colour gets from p in the box along d, as far as `length` or the box's faces.
+// The transmittance of each colour from p in the box along d, as far as `length` or the box's faces.
 static inline Real3 box_transmittance(constant const View *view, constant const Scattering *params, Real3 p, Real3 d, Real length) {
     Real3 way = way_of(view, d);
-    #define REACH(i, c) select((select((Real)(0.0f), (Real)((float)view->dims[i]), MASK(way.c > 0.0f)) - p.c) / way.c, (Real)(1e30f), MASK(fabs(way.c) < 1e-12f))
-    Real x = REACH(0, x), y = REACH(1, y), z = REACH(2, z), t = LESSER(LESSER(x, y), LESSER(z, length));
-    #undef REACH
+    #define LENGTH_TO(i, c) select((select((Real)(0.0f), (Real)((float)view->dims[i]), MASK(way.c > 0.0f)) - p.c) / way.c, (Real)(1e30f), MASK(fabs(way.c) < 1e-12f))
+    Real x = LENGTH_TO(0, x), y = LENGTH_TO(1, y), z = LENGTH_TO(2, z), t = LESSER(LESSER(x, y), LESSER(z, length));
+    #undef LENGTH_TO
     Real tau = GREATER(t, (Real)(0.0f)) * params->majorant;
     if (!params->chromatic) {
         Real through = exp(-tau);
@@ -53,7 +53,7 @@ static inline Real range_end(global const uchar *ranges, Int cell, int greatest)
     return first_voxel(gather_words(ranges, (cell * 2 + greatest) * VOXEL_BYTES));
 }
 
-// How often a free path ends in the cell, per length: the greatest colour's extinction, or a majorant of it.
+// The rate at which free paths end in the cell, per length: the extinction of the greatest colour, or a majorant of it.
 static inline Real rate_at(constant const View *view, constant const Scattering *params, VOLUME voxels, global const uchar *ranges, const Flight *f) {
 #if DENSITY == DENSITY_CONSTANT
     return (Real)(params->majorant);
@@ -63,18 +63,18 @@ static inline Real rate_at(constant const View *view, constant const Scattering 
     return density_at(view, params, voxels, f->p) * params->sigma_most;
 #else
     if (params->whole) return (Real)(params->majorant);
-    Int cell = (f->cell.z * params->walls[1] + f->cell.y) * params->walls[0] + f->cell.x;
+    Int cell = (f->cell.z * params->cells[1] + f->cell.y) * params->cells[0] + f->cell.x;
     return density_of(params, range_end(ranges, cell, params->density_scale > 0.0f)) * params->majorant;
 #endif
 }
 
-// Which of the tentative collisions are real where colours have extinctions of their own, the greatest `sigma`.
-static inline Mask tell_colours(constant const Scattering *params, Real sigma, Real rate, Real u, Mask hit, Flight *f) {
+// Classifies tentative collisions of colours with extinctions of their own, the greatest `sigma`. Returns the real ones.
+static inline Mask classify_by_colour(constant const Scattering *params, Real sigma, Real rate, Real u, Mask hit, Flight *f) {
     Mask free = hit & ~f->ratio;
-    Real3 s = real3(sigma * params->colour[0], sigma * params->colour[1], sigma * params->colour[2]), w = f->carried;
+    Real3 s = real3(sigma * params->colour[0], sigma * params->colour[1], sigma * params->colour[2]), w = f->throughput;
     Real3 through = real3(1.0f - s.x / rate, 1.0f - s.y / rate, 1.0f - s.z / rate);
     Real sum = fabs(w.x) + fabs(w.y) + fabs(w.z), mean = mad(fabs(w.x), s.x, mad(fabs(w.y), s.y, fabs(w.z) * s.z)) / fmax(sum, (Real)(1e-30f));
-    // Where the majorant is too small, the chance of a real collision stays below 1.
+    // If the majorant is too small, the chance of a real collision stays below 1.
     Real chance = fmin(mean / rate, select((Real)(1.0f), (Real)(0.5f), MASK(sigma > rate)));
     Mask real = free & MASK(u < chance);
     Real if_real = 1.0f / (rate * chance), if_null = 1.0f / (1.0f - chance);
@@ -83,14 +83,14 @@ static inline Mask tell_colours(constant const Scattering *params, Real sigma, R
     // The weight is the greatest colour's, for the roulette.
     Real most = fmax(fabs(by.x), fmax(fabs(by.y), fabs(by.z))), inverse = 1.0f / fmax(most, (Real)(1e-30f));
     Mask lights = hit & MASK(most > 0.0f);
-    f->carried = select3(f->carried, real3(w.x * by.x * inverse, w.y * by.y * inverse, w.z * by.z * inverse), lights);
+    f->throughput = select3(f->throughput, real3(w.x * by.x * inverse, w.y * by.y * inverse, w.z * by.z * inverse), lights);
     f->weight = select(f->weight, f->weight * most, hit);
     return real;
 }
 
-// Which of the collisions by `rate` are real, where the extinction is `sigma`.
-static inline Mask tell_collisions(constant const Scattering *params, Real sigma, Real rate, Real u, Mask hit, Flight *f) {
-    if (params->chromatic) return tell_colours(params, sigma, rate, u, hit, f);
+// Classifies collisions by `rate` where the extinction is `sigma`. Returns the real ones.
+static inline Mask classify_collisions(constant const Scattering *params, Real sigma, Real rate, Real u, Mask hit, Flight *f) {
+    if (params->chromatic) return classify_by_colour(params, sigma, rate, u, hit, f);
 #if !BY_MAJORANTS
     return hit;
 #else
@@ -108,7 +108,7 @@ typedef struct { Real3 at, length; Real nearest; } Boundaries;
 static inline Boundaries boundaries_ahead(constant const View *view, constant const Scattering *params, const Flight *f) {
     Boundaries b;
     #define AXIS(i, c)                                                                                                     \
-        b.at.c = wall_on_axis(f->cell.c, MASK(f->way.c > 0.0f), 0.0f, params->wall_voxels[i], (float)view->dims[i], params->walls[i]); \
+        b.at.c = boundary_on_axis(f->cell.c, MASK(f->way.c > 0.0f), 0.0f, params->voxels_per_cell[i], (float)view->dims[i], params->cells[i]); \
         b.length.c = select(GREATER((b.at.c - f->p.c) * f->inverse.c, (Real)(0.0f)), (Real)(1e30f), MASK(fabs(f->way.c) < 1e-12f));
     AXIS(0, x)
     AXIS(1, y)
@@ -128,7 +128,7 @@ static inline Mask cross_boundary(constant const Scattering *params, const Bound
         {                                                                                                                  \
             Int next = f->cell.c + select((Int)(-1), (Int)(1), MASK(f->way.c > 0.0f));                                     \
             /* A flight that leaves keeps its cell: there is none beyond. */                                               \
-            Mask out = in_##c & (MASK(next < 0) | MASK(next >= params->walls[i]));                                         \
+            Mask out = in_##c & (MASK(next < 0) | MASK(next >= params->cells[i]));                                         \
             f->cell.c = select(f->cell.c, next, in_##c & ~out);                                                            \
             left |= out;                                                                                                   \
             *face = select(*face, (Int)(i), out);                                                                          \
@@ -151,7 +151,7 @@ static inline void attenuate(constant const Scattering *params, Real depth, Flig
     Real3 s = real3(params->colour[0], params->colour[1], params->colour[2]);
     Real least = fmin(s.x, fmin(s.y, s.z));
     f->weight *= exp(-depth * least);
-    f->carried = real3(f->carried.x * exp(-depth * (s.x - least)), f->carried.y * exp(-depth * (s.y - least)), f->carried.z * exp(-depth * (s.z - least)));
+    f->throughput = real3(f->throughput.x * exp(-depth * (s.x - least)), f->throughput.y * exp(-depth * (s.y - least)), f->throughput.z * exp(-depth * (s.z - least)));
 }
 #endif
 
@@ -163,12 +163,12 @@ static inline Mask collide_at(constant const View *view, constant const Scatteri
     f->event += as_UInt(select((Int)(0), (Int)(1), hit));
     Real u = unit_open(r->d);
 #if !BY_MAJORANTS
-    return tell_collisions(params, rate, rate, u, hit, f);
+    return classify_collisions(params, rate, rate, u, hit, f);
 #else
     Real sigma = density_at(view, params, voxels, f->p) * params->sigma_most;
     Mask broken = hit & MASK(sigma > rate * 1.00001f);
     if (any_lane(broken)) atomic_add(&counts[COUNT_BROKEN], (uint)count_lanes(broken));
-    Mask real = tell_collisions(params, sigma, rate, u, hit, f);
+    Mask real = classify_collisions(params, sigma, rate, u, hit, f);
     Mask faint = hit & f->ratio & MASK(fabs(f->weight) < FAINT);
     if (any_lane(faint)) {
         Real chance = fabs(f->weight) * (1.0f / FAINT);

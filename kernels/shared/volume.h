@@ -59,7 +59,7 @@ static inline Real nearest_raw(constant const View *view, VOLUME voxels, Real3 p
 #define TAPS 4
 #endif
 
-// The weights of the voxels around a place, and their derivatives; f is how far it is past the one before it, from 0 to 1.
+// The weights of the voxels around a position, and their derivatives; f is its distance from the voxel before it, from 0 to 1.
 // Cubic B-spline (approximating) and Catmull-Rom (interpolating): Mitchell & Netravali, SIGGRAPH 1988, with (B, C) = (1, 0)
 // and (0, 1/2).
 static inline void tap_weights(Real f, Real weight[TAPS], Real slope[TAPS]) {

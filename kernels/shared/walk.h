@@ -73,7 +73,7 @@ static inline void pair_raw(global const uchar *voxels, Int at, Real *a, Real *b
 }
 
 // The eight voxels around p, and the lowest corner. Beyond the outermost centres both of a pair are the one at the edge, so
-// that a NaN further in does not reach there.
+// that a NaN further in has no effect there.
 static inline Corners corners_at(constant const View *view, VOLUME voxels, Real3 p) {
     int nx = view->dims[0], ny = view->dims[1], nz = view->dims[2];
     Corners c;
@@ -141,14 +141,14 @@ static inline Real stretch(constant const View *view, VOLUME voxels, float sign,
         stretch_peak(&c, sign, o, d, t, length, on, best);
         return (Real)(0.0f);
     }
-    Real apart = length * 0.288675135f; // 1 / (2 sqrt 3)
-    return 0.5f * (corners_raw(&c, along(o, d, middle - apart)) + corners_raw(&c, along(o, d, middle + apart)));
+    Real offset = length * 0.288675135f; // 1 / (2 sqrt 3)
+    return 0.5f * (corners_raw(&c, along(o, d, middle - offset)) + corners_raw(&c, along(o, d, middle + offset)));
 #else
-    const float place[5] = {-0.453089923f, -0.269234655f, 0.0f, 0.269234655f, 0.453089923f};
+    const float node[5] = {-0.453089923f, -0.269234655f, 0.0f, 0.269234655f, 0.453089923f};
     const float weight[5] = {0.118463443f, 0.239314335f, 0.284444444f, 0.239314335f, 0.118463443f};
     Real sum = (Real)(0.0f);
     for (int i = 0; i < 5; i++) {
-        Real v = sample_raw(view, voxels, along(o, d, mad(length, (Real)(place[i]), middle)));
+        Real v = sample_raw(view, voxels, along(o, d, mad(length, (Real)(node[i]), middle)));
         sum = mad((Real)(weight[i]), v, sum);
         *best = select(*best, sign * v, on & MASK(sign * v > *best));
     }

@@ -21,7 +21,7 @@ static inline Real3 window_colour(global const uchar *table, float scale, float 
     #undef CHANNEL
 }
 
-// What goes on the film where there is a value: its colour, or itself.
+// Adds values to the film where there are any: their colours, or themselves.
 static inline void film_value(constant const View *view, global float *film, global uint *counts, const Packet *p, global const uchar *table,
                               float scale, float offset, int raw_values, Real value, Mask shown) {
     Real3 colour = raw_values ? real3(value, value, value) : window_colour(table, scale, offset, value);

@@ -1,4 +1,4 @@
-//! Macro-cells on the device: the least and greatest value in each block of voxels, and from them how far it is to anything
+//! Macro-cells on the device: the least and greatest value in each block of voxels, and from them the distance to anything
 //! that a view wants to see.
 
 use super::program::{Source, Variant};
@@ -12,15 +12,15 @@ use crate::volume::VoxelType;
 pub const CELL: usize = 4;
 
 device_struct! {
-    /// What the kernels of the cells are told.
+    /// Parameters of the kernels of the cells.
     pub struct CellsPass {
         /// Voxels along x, y, z.
         pub dims: [i32; 3],
         /// The axis of a pass of `distances`.
         pub axis: i32,
-        /// How many intervals of values make a cell occupied.
+        /// The number of intervals of values that make a cell occupied.
         pub intervals: i32,
-        /// How far beyond a cell's range an interpolant may go, as a part of it.
+        /// An interpolant may go beyond a cell's range by this part of it.
         pub overshoot: f32,
     }
 }
@@ -41,7 +41,7 @@ pub fn sources() -> [Source; 2] {
     ]
 }
 
-/// What a volume of such voxels needs.
+/// The variants that a volume of such voxels needs.
 pub fn needed(voxel: VoxelType) -> [Variant; 2] {
     [variant("cells", voxel), variant("distances", voxel)]
 }

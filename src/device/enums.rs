@@ -5,11 +5,11 @@ use std::fmt::Debug;
 
 /// An enum whose variants kernels know by name.
 pub trait DeviceEnum: Copy + Debug + 'static {
-    /// What the names of its variants begin with in OpenCL C.
+    /// The names of its variants begin with this in OpenCL C.
     const PREFIX: &'static str;
     /// The variants in order.
     const ALL: &'static [Self];
-    /// How many there are.
+    /// The number of variants.
     const LENGTH: usize = Self::ALL.len();
 
     /// The number of a variant.

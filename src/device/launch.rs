@@ -13,7 +13,7 @@ use super::signature::{self, Parameter};
 use super::{Buffer, Device, Memory, cl};
 use crate::error::{Error, Result};
 
-/// How many work-items a launch has, along one to three dimensions. A number alone is one dimension.
+/// The number of work-items of a launch, along one to three dimensions. A number alone is one dimension.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Range {
     /// Along one dimension.

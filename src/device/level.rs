@@ -1,4 +1,4 @@
-//! For which instruction set the device's compiler makes code: what its own macros say of it.
+//! The instruction set that the device's compiler makes code for, by its own macros.
 
 use super::Device;
 use super::enums::DeviceEnum;

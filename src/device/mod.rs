@@ -3,7 +3,7 @@
 //! A [`Device`] lives on the thread that opened it (the job engine's), so that everything else stays free of OpenCL.
 
 pub mod cells;
-pub mod develop;
+pub mod encode;
 pub mod enums;
 mod images;
 mod include;
@@ -25,6 +25,8 @@ use opencl3::memory::{Buffer as ClBuffer, CL_MEM_COPY_HOST_PTR, CL_MEM_READ_WRIT
 use opencl3::program::Program;
 use opencl3::types::{CL_BLOCKING, cl_uchar};
 
+/// Its former name, which `job` still says.
+pub use encode as develop;
 pub use launch::Range;
 pub use select::{DeviceInfo, NO_DEVICE, list, select};
 pub use signature::Parameter;
@@ -36,7 +38,7 @@ use program::{Source, Variant};
 /// Uploads below so many bytes are copied where their padding is added.
 const SMALL: usize = 1 << 20;
 
-/// How a device is chosen and where its compiled kernels are kept.
+/// The choice of a device, and of its kernels.
 #[derive(Debug, Clone)]
 pub struct DeviceConfig {
     /// `pocl`, `gpu`, or part of a platform's or device's name.
@@ -45,9 +47,9 @@ pub struct DeviceConfig {
     pub lanes: Option<u32>,
     /// Kernel files are read from here instead of the binary.
     pub kernels: Option<PathBuf>,
-    /// Whether views sample volumes as 3D images; by default where the device is a GPU that can.
+    /// True if views sample volumes as 3D images; by default where the device is a GPU that can.
     pub images: Option<bool>,
-    /// Whether a compiler's warning fails a build: in tests. In service it would take a technique away for nothing.
+    /// True if a compiler's warning fails a build: in tests. In service it would take a technique away for nothing.
     pub strict: bool,
     /// This program, which compiles kernels ahead in processes of its own where it is given; else each is built when first used.
     pub compiler: Option<PathBuf>,
@@ -77,7 +79,7 @@ impl Buffer {
         self.bytes
     }
 
-    /// Whether it has no bytes: never, since OpenCL permits no empty buffer.
+    /// True if it has no bytes: never, since OpenCL permits no empty buffer.
     pub fn is_empty(&self) -> bool {
         self.bytes == 0
     }
@@ -98,11 +100,11 @@ fn cl<T>(doing: &str, result: std::result::Result<T, opencl3::error_codes::ClErr
     result.map_err(|e| Error::internal(format!("OpenCL, {doing}: {e}")))
 }
 
-/// Ends the process at once, without the destructors that `exit` runs: PoCL's and LLVM's take apart what the device's thread may still
-/// be compiling with, and then it crashes instead of ending.
+/// Ends the process without running destructors: PoCL's and LLVM's would destroy what the device's thread may still be compiling with, and
+/// the process would crash.
 pub fn leave(code: i32) -> ! {
     use std::io::Write;
-    // What nobody reads any more cannot be flushed, which is no reason to stay.
+    // A pipe that nobody reads any more cannot be flushed; the process ends all the same.
     let _ = std::io::stdout().flush();
     // SAFETY: takes a number and does not return; files are written through, and no lock matters to a process that ends.
     unsafe { libc::_exit(code) }
@@ -159,7 +161,7 @@ impl Device {
         Ok(device)
     }
 
-    /// What the device says of itself.
+    /// The description of the device.
     pub fn info(&self) -> &DeviceInfo {
         &self.info
     }
@@ -169,7 +171,7 @@ impl Device {
         self.info.gave_up = gave_up;
     }
 
-    /// Whether a variant is built.
+    /// True if a variant is built.
     pub fn is_built(&self, variant: &Variant) -> bool {
         self.kernels.contains_key(variant)
     }
@@ -179,7 +181,7 @@ impl Device {
         variant.options(self.info.lanes, self.info.volumes_are_images, self.strict)
     }
 
-    /// What the compiled form of a variant depends on, as a hash: its text, its options, the device and its driver.
+    /// A hash of all that the compiled form of a variant depends on: its text, its options, the device and its driver.
     ///
     /// # Errors
     /// [`Error::Internal`] when a kernel file is missing.

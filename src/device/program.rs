@@ -47,7 +47,7 @@ pub struct Variant {
     pub features: Features,
 }
 
-/// What a technique gives to build its kernel from, besides the file itself.
+/// The source of a program: its file, and what the host adds to it.
 #[derive(Debug, Clone)]
 pub struct Source {
     /// The kernel file's name, without `.cl`.
@@ -56,7 +56,7 @@ pub struct Source {
     pub structs: fn() -> String,
     /// Every variant that may be built.
     pub variants: fn() -> Vec<Variant>,
-    /// How many of them, from the first, are built before the service is ready; the others when they are first asked for.
+    /// The number of variants, from the first, that are built before the service is ready; the others are built when first asked for.
     pub common: usize,
 }
 

@@ -1,4 +1,4 @@
-//! Which OpenCL device is used, and what it says of itself.
+//! The choice of the OpenCL device, and its description.
 
 use opencl3::device::{CL_DEVICE_TYPE_ALL, CL_DEVICE_TYPE_CPU, CL_DEVICE_TYPE_GPU, Device as ClDevice};
 use opencl3::platform::{Platform, get_platforms};
@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 
-/// What an OpenCL device says of itself, as `GET /v1/device` and `cloudchamber device` show it.
+/// The description of an OpenCL device, as `GET /v1/device` and `cloudchamber device` show it.
 #[derive(Debug, Clone, Serialize)]
 pub struct DeviceInfo {
     /// The OpenCL platform, such as `Portable Computing Language`.
@@ -35,31 +35,31 @@ pub struct DeviceInfo {
     pub largest_work_group: usize,
     /// Floats that the device likes in a vector: what the lanes are chosen by.
     pub native_vector_width_float: u32,
-    /// Whether images (textures) are supported.
+    /// True if images (textures) are supported.
     pub image_support: bool,
     /// Formats of 3D images, as `order/type` in OpenCL's names; known once the device is opened.
     pub image_formats_3d: Vec<String>,
     /// The largest 3D image, voxels a side.
     pub largest_image_3d: [usize; 3],
-    /// How images may be read: filters and what is beyond the edge.
+    /// The ways to read images: filters, and addressing beyond the edge.
     pub sampler_modes: &'static [&'static str],
-    /// Whether views read volumes as images, filtered by the device's sampler; otherwise from buffers, by the kernels.
+    /// True if views read volumes as images, filtered by the device's sampler; otherwise from buffers, by the kernels.
     pub volumes_are_images: bool,
     /// The same in words, with its precision.
     pub volume_sampling: &'static str,
-    /// Whether 64-bit integer atomics are there (photon transport needs them).
+    /// True if 64-bit integer atomics are there (photon transport needs them).
     pub int64_atomics: bool,
     /// Rays or photons that one work-item carries here.
     pub lanes: u32,
     /// The instruction set that kernels are compiled for, such as `AVX2`; known once the device is opened.
     pub level: &'static str,
-    /// What was tried and failed before this, such as more lanes, in words.
+    /// Attempts that failed before this one, such as more lanes, in words.
     pub gave_up: Vec<String>,
     /// Work-items in a work-group here.
     pub local_size: usize,
 }
 
-/// What OpenCL C 1.2 promises wherever there are images.
+/// OpenCL C 1.2 promises these wherever there are images.
 const SAMPLER_MODES: &[&str] = &[
     "filter nearest",
     "filter linear",
@@ -76,7 +76,7 @@ const FROM_BUFFERS: &str =
 const FROM_IMAGES: &str = "image: trilinear by the device's sampler, whose weights have 8 fractional bits on a GPU";
 
 impl DeviceInfo {
-    /// Whether it is PoCL's: that compiles at the first launch, and keeps what it compiled for other processes too.
+    /// True if it is PoCL's: that compiles at the first launch, and keeps what it compiled for other processes too.
     pub fn is_pocl(&self) -> bool {
         self.platform.contains("Portable Computing Language")
     }
@@ -91,7 +91,7 @@ impl DeviceInfo {
     }
 }
 
-/// What somebody can do where no OpenCL device can be used.
+/// Advice for a machine on which no OpenCL device can be used.
 pub const NO_DEVICE: &str = "there is no usable OpenCL device: install PoCL for the processor (Debian and Ubuntu: \
     apt install pocl-opencl-icd ocl-icd-libopencl1 binutils) or the graphics card's OpenCL driver; `cloudchamber device` lists what \
     there is, --device NAME chooses, and --lanes 4 or --lanes 1 asks for less of the compiler";

@@ -41,7 +41,7 @@ fn tokens(text: &str) -> Vec<&str> {
     found
 }
 
-/// Where a directive ends: at its line's end, unless that is continued.
+/// The length of a directive, which ends with its line, unless that is continued.
 fn directive_length(text: &str) -> usize {
     let mut from = 0;
     while let Some(end) = text[from..].find('\n') {
@@ -53,7 +53,7 @@ fn directive_length(text: &str) -> usize {
     text.len()
 }
 
-/// How many tokens the parentheses at the beginning enclose, with themselves.
+/// The number of tokens that the parentheses at the beginning enclose, with themselves.
 fn enclosed(tokens: &[&str]) -> usize {
     let mut depth = 0;
     let closes = |token: &&str| {
@@ -100,7 +100,7 @@ fn parameters_of_list(function: &str, list: &[&str]) -> Result<Vec<Parameter>> {
     Ok(parameters)
 }
 
-/// Which parameter each of the arguments `names` is. Parameters are few: to look a name up among them costs less than to hash it.
+/// The place of each of the arguments `names` among the parameters. These are few: to search them costs less than to hash a name.
 ///
 /// # Errors
 /// [`Error::Internal`] naming an argument that is unknown or doubled, or a parameter without an argument.

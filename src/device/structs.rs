@@ -26,7 +26,7 @@ scalar!(f32, "float");
 scalar!(i32, "int");
 scalar!(u32, "uint");
 
-/// What a device struct can tell of itself.
+/// A struct that the host and the device share.
 pub trait DeviceStruct: bytemuck::Pod {
     /// Its name in Rust and in OpenCL C.
     const NAME: &'static str;
@@ -71,7 +71,7 @@ pub const LIGHTS: usize = 4;
 pub const PLANES: usize = 14;
 
 device_struct! {
-    /// What every view kernel is told of the camera, the image and the pass. See `kernels/shared/camera.h`.
+    /// The camera, the image and the pass, for every view kernel. See `kernels/shared/camera.h`.
     pub struct View {
         /// The image's (0, 0) corner on the plane near the volume, index units.
         pub plane: [f32; 3],
@@ -105,19 +105,19 @@ device_struct! {
         pub first_beam: i32,
         /// Number of the sample in its film, from 0.
         pub sample: i32,
-        /// Which film: keeps the random numbers of the films apart.
+        /// The film's number: each film has random numbers of its own.
         pub stream: u32,
         /// The request's seed.
         pub seed: [u32; 2],
-        /// Where in a pixel the ray goes through, in full-size pixels.
+        /// Sample offset: the point of a pixel that the ray goes through, in full-size pixels.
         pub offset: [f32; 2],
         /// The step along the ray, world units.
         pub step: f32,
-        /// Whether samples lie at random places within their steps (1) or all at `place` (0).
+        /// 1 if samples lie at random positions within their steps, 0 if all lie at `place`.
         pub jittered: i32,
-        /// Where in their steps samples lie that are not jittered, from 0 to 1.
+        /// The position of samples that are not jittered within their steps, from 0 to 1.
         pub place: f32,
-        /// How many clipping planes there are.
+        /// The number of clipping planes.
         pub planes: i32,
         /// Four numbers a plane, index units: a x + b y + c z + d is not negative where the volume is shown.
         pub plane_index: [f32; 4 * PLANES],
@@ -131,7 +131,7 @@ device_struct! {
         pub ambient: f32,
         /// Exponent of the highlight.
         pub shininess: f32,
-        /// How many lights there are.
+        /// The number of lights.
         pub lights: i32,
         /// Towards each light, world space, unit length.
         pub light_direction: [f32; 3 * LIGHTS],

@@ -11,7 +11,7 @@ use super::motion::Moving;
 use super::rounds::Rounds;
 use super::view_run::Pass;
 use crate::device::Buffer;
-use crate::device::develop::{Developer, Look, Set};
+use crate::device::encode::{EncodeSettings, Encoder, Set};
 use crate::device::enums::{Count, DeviceEnum};
 use crate::error::Result;
 use crate::film::picture::Background;
@@ -40,7 +40,7 @@ pub(super) struct Gathered {
     stepless: bool,
     opacity_threshold: f64,
     background: Background,
-    developer: Developer,
+    encoder: Encoder,
     /// What was developed last, as long as it is what there is to see.
     developed: Option<Film>,
     /// What the kernels had counted then.
@@ -61,8 +61,8 @@ impl Gathered {
     ) -> Result<Self> {
         let region = scene.region();
         let size = region.size.map(|n| n.div_ceil(region.apart) as usize);
-        let (room, developer) = before.map(|b| (b.layers.map(|l| l.buffer).into(), b.developer)).unzip();
-        let developer = Developer::new(&mut context.device, &context.curve, size, scene.background(), developer)?;
+        let (room, encoder) = before.map(|b| (b.layers.map(|l| l.buffer).into(), b.encoder)).unzip();
+        let encoder = Encoder::new(&mut context.device, &context.curve, size, scene.background(), encoder)?;
         let device = &context.device;
         let sparse = match size[0].min(size[1]) {
             400.. => CONTROL[0],
@@ -84,7 +84,7 @@ impl Gathered {
             stepless: plan.stepless,
             opacity_threshold: plan.opacity_threshold,
             background: scene.background(),
-            developer,
+            encoder,
             developed: None,
             counted: SampleCounts::default(),
         })
@@ -107,7 +107,7 @@ impl Gathered {
     /// Bytes on the device.
     pub fn bytes(&self) -> usize {
         let moving = self.moving.as_ref().map_or(0, |m| m.layer.buffer.len());
-        self.layers.iter().map(|l| l.buffer.len()).sum::<usize>() + self.developer.bytes() + moving
+        self.layers.iter().map(|l| l.buffer.len()).sum::<usize>() + self.encoder.bytes() + moving
     }
 
     pub fn layer(&self, pass: Pass) -> &Layer {
@@ -172,12 +172,12 @@ impl Gathered {
         let pass = self.shown();
         // Of one sample a pixel has no deviation: it tells only where that sample was not finite.
         self.counted = self.read_counts(context)?;
-        let Self { layers, moving, developer, counted, .. } = self;
+        let Self { layers, moving, encoder, counted, .. } = self;
         let shown = layer(layers, moving.as_ref(), pass);
         let main = shown.unread();
         let controlled = pass == Pass::Main && layers[0].samples > 0 && !self.stepless;
         let control = controlled.then(|| layers[0].unread());
-        let look = Look {
+        let settings = EncodeSettings {
             size: self.size,
             background: self.background,
             opacity_threshold: self.opacity_threshold,
@@ -185,7 +185,7 @@ impl Gathered {
         };
         let of_control = control.as_ref().map(|samples| Set { buffer: &layers[0].buffer, samples });
         let of_main = Set { buffer: &shown.buffer, samples: &main };
-        let sums = developer.develop(&context.device, of_main, of_control, &look)?;
+        let sums = encoder.encode(&context.device, of_main, of_control, &settings)?;
         let twice = if self.stepless { 1.0 } else { 2.0 };
         let (lowered, step_loss) = match (pass, moving) {
             (Pass::Moving, Some(moving)) => (moving.lowered, Some(moving.step_loss)),
@@ -212,7 +212,7 @@ impl Gathered {
 
     /// The bytes of the picture that was developed last.
     pub fn picture(&self, context: &DeviceContext) -> Result<Vec<u8>> {
-        self.developer.picture(&context.device)
+        self.encoder.picture(&context.device)
     }
 
     /// What there is to see, with its pixels.

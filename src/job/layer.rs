@@ -4,7 +4,7 @@ use std::rc::Rc;
 
 use super::context::DeviceContext;
 use super::tiling::{TILE, Tiling};
-use crate::device::develop::PADDING;
+use crate::device::encode::PADDING;
 use crate::device::{Buffer, Device};
 use crate::error::Result;
 use crate::film::Samples;

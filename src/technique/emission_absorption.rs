@@ -90,7 +90,7 @@ device_struct! {
         pub valley: [f32; 3],
         /// Width of contours, world units.
         pub contour_width: f32,
-        /// Whether cool-to-warm shading replaces the light's.
+        /// 1 if cool-to-warm shading replaces the light's.
         pub toned: i32,
         /// Colour away from the light.
         pub cool: [f32; 3],
@@ -100,7 +100,7 @@ device_struct! {
         pub translucency: f32,
         /// Exponent of its lobe.
         pub translucency_exponent: f32,
-        /// Whether a styled sample is lit.
+        /// 1 if a styled sample is lit.
         pub lit: i32,
     }
 }
@@ -247,7 +247,7 @@ impl Parameters {
         }
     }
 
-    /// Whether the kernel with all styles is needed.
+    /// True if the kernel with all styles is needed.
     fn styled(&self) -> bool {
         self.styles().any() || self.regions.is_some()
     }
@@ -262,7 +262,7 @@ impl Parameters {
         self.interpolation.unwrap_or(default)
     }
 
-    /// What cannot be had together.
+    /// Refuses options that exclude each other.
     fn check_together(&self, at: &str) -> Result<()> {
         let labels = self.labels();
         let plain = self.interpolation() == Interpolation::Trilinear && !self.styled();

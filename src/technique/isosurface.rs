@@ -56,7 +56,7 @@ device_struct! {
     pub struct Isosurface {
         /// −1 where values fall as raw values rise, else 1.
         pub sign: f32,
-        /// How many surfaces there are.
+        /// The number of surfaces.
         pub surfaces: i32,
         /// Raw values, ascending.
         pub isovalue: [f32; MOST_SURFACES],
@@ -68,15 +68,15 @@ device_struct! {
         pub transmittance_floor: f32,
         /// Width at which a bracket of a crossing is narrow enough, world units.
         pub tolerance: f32,
-        /// Whether the normal is the interpolant's own gradient.
+        /// 1 if the normal is the interpolant's own gradient.
         pub analytic: i32,
-        /// Whether the distance from the eye goes to the film instead of a colour.
+        /// 1 if the distance from the eye goes to the film instead of a colour.
         pub depth: i32,
         /// Rays that look for what hides the sky; 0 for none.
         pub occlusion_rays: i32,
-        /// How far they look, world units.
+        /// Their length, world units.
         pub occlusion_radius: f32,
-        /// How far above the surface they start, world units.
+        /// The height above the surface at which they start, world units.
         pub occlusion_start: f32,
     }
 }

@@ -1,4 +1,4 @@
-//! What the techniques share that follow light by delta tracking, or by the lecture's march.
+//! Trackers and majorants, for the techniques that follow light through media.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -6,7 +6,7 @@ use serde::Deserialize;
 use crate::device_enum;
 
 device_enum! {
-    /// How free paths are found (`kernels/shared/walls.h`).
+    /// The ways to find free paths (`kernels/shared/dda.h`).
     pub enum Tracking: "TRACKING" {
         /// In closed form from one change of the extinction to the next.
         Exact,

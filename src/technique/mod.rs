@@ -48,11 +48,11 @@ pub(crate) fn view_text() -> String {
     DeviceView::opencl_text() + &Interpolation::opencl_text() + &Count::opencl_text()
 }
 
-/// What the service knows of a technique.
+/// The description of a technique.
 pub struct Technique {
     /// Its name: of its Rust file, its kernel, its test, and in a request.
     pub name: &'static str,
-    /// What it computes, in a sentence.
+    /// Its purpose, in a sentence.
     pub summary: &'static str,
     /// JSON Schema of its own parameters.
     pub schema: fn() -> &'static Value,
@@ -60,7 +60,7 @@ pub struct Technique {
     pub example: fn() -> Value,
     /// Its kernel and the variants of it.
     pub source: fn() -> Source,
-    /// Whether it is a view or a field, with its parser: parameters and their JSON pointer.
+    /// View or field, with the parser of its parameters, which is told their JSON pointer.
     pub kind: Kind,
 }
 
@@ -83,10 +83,10 @@ impl Technique {
     }
 }
 
-/// What a view's kernel is told of the macro-cells (`kernels/cells.cl`).
+/// The macro-cells' part in a view (`kernels/cells.cl`).
 #[derive(Debug, Clone, PartialEq)]
 pub enum CellUse {
-    /// How far each cell is from the nearest with a value in these intervals, a byte a cell: those without any are leapt over.
+    /// The distance of each cell to the nearest one with a value in these intervals, a byte a cell: empty cells are skipped.
     Distances(Vec<[f64; 2]>),
     /// The least and greatest voxel that a sample in each cell can read, in the volume's own type.
     Ranges,
@@ -94,16 +94,16 @@ pub enum CellUse {
     None,
 }
 
-/// What a view's kernel is run with for one volume: data, no device needed to make it.
+/// The plan of a view for one volume: data, made without a device.
 #[derive(Debug, Clone)]
 pub struct ViewPlan {
     /// The kernel variant.
     pub variant: Variant,
-    /// What the kernel is told of the macro-cells.
+    /// The use of macro-cells.
     pub cells: CellUse,
     /// The step of the finest pass, world units.
     pub step: f32,
-    /// Whether the step plays no part in the picture.
+    /// True if the step plays no part in the picture.
     pub stepless: bool,
     /// Past this opacity a ray ends; what it leaves out is part of the error.
     pub opacity_threshold: f64,
@@ -111,10 +111,10 @@ pub struct ViewPlan {
     pub reasons: Vec<String>,
 }
 
-/// How a view takes samples that are random: by tiles (`kernels/shared/tile.h`).
+/// The sampling scheme of a stochastic view: by tiles (`kernels/shared/tile.h`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Random {
-    /// Whether more of them are taken where the noise is.
+    /// True if more samples are taken where the noise is.
     pub adaptive: bool,
     /// The luminance that brighter ones are scaled down to.
     pub clamp_luminance: Option<f64>,
@@ -134,7 +134,7 @@ pub trait View: Send + Sync {
     fn resolution(&self, _volume: &Volume) -> Result<Option<f64>> {
         Ok(None)
     }
-    /// What to run for `volume`.
+    /// The plan for `volume`.
     ///
     /// # Errors
     /// `Error::Invalid` where parameters and volume do not go together.
@@ -151,9 +151,9 @@ pub trait View: Send + Sync {
     fn table(&self, _volume: &Volume, _step: f32) -> Result<Vec<u32>> {
         Ok(Vec::new())
     }
-    /// What it asks of the fields that all views share, such as its lights.
+    /// Sets fields that all views share, such as its lights.
     fn look(&self, _camera: &Camera, _view: &mut DeviceView) {}
-    /// Whether it can leave out what is beyond clipping planes.
+    /// True if clipping planes cut it.
     fn clips(&self) -> bool {
         true
     }
@@ -161,21 +161,21 @@ pub trait View: Send + Sync {
     fn steepest_slope(&self, _volume: &Volume) -> Option<f64> {
         None
     }
-    /// Whether values are labels, of which there is no mean.
+    /// True if values are labels, of which there is no mean.
     fn shows_labels(&self) -> bool {
         false
     }
-    /// How its samples are taken, where they are random.
+    /// The sampling scheme of a stochastic view; `None` for a deterministic one.
     fn random(&self) -> Option<Random> {
         None
     }
-    /// What a reader should know of the parameters on this volume: objects with `code` and `message`.
+    /// Warnings about the parameters on this volume: objects with `code` and `message`.
     fn warnings(&self, _volume: &Volume) -> Vec<Value> {
         Vec::new()
     }
 }
 
-/// What a field's kernel is run with: data, no device needed to make it.
+/// The plan of a field: data, made without a device.
 pub struct FieldPlan {
     /// The kernel variant.
     pub variant: Variant,
@@ -187,13 +187,13 @@ pub struct FieldPlan {
     pub cells: usize,
     /// 64-bit sums beside the grid, such as the energy ledger.
     pub ledger: usize,
-    /// How many histories (photons) make the whole.
+    /// The number of histories (photons).
     pub histories: u64,
     /// Why it is planned so, in words.
     pub reasons: Vec<String>,
 }
 
-/// What a field has come to: a volume to look at and what stands under `result` in the reply.
+/// The result of a field: a volume to look at, and the `result` of the reply.
 pub struct FieldResult {
     /// The grid, normalised per history.
     pub volume: Volume,
@@ -205,7 +205,7 @@ pub struct FieldResult {
 pub trait Field: Send + Sync {
     /// The framing of its grid.
     fn framing(&self) -> Framing;
-    /// What to run.
+    /// The plan.
     ///
     /// # Errors
     /// `Error::Internal` when its input cannot be made.

@@ -36,13 +36,13 @@
 //! Example: see [`example`], which a test runs.
 
 pub mod attenuation;
+mod clearance;
 mod device;
 mod geometry;
 mod layers;
 mod medium;
 mod parameters;
 mod plan;
-mod reach;
 mod report;
 mod source;
 mod tracking;
@@ -115,7 +115,7 @@ struct Simulation {
     source: source::Source,
     tracking: Tracking,
     tracking_reason: String,
-    /// Whether deposits are by track length.
+    /// True if deposits are by track length.
     track: bool,
     reasons: Vec<String>,
 }
@@ -180,7 +180,7 @@ fn parse(parameters: &Value, at: &str, store: &Store) -> Result<Arc<dyn Field>> 
         reasons,
     };
     // Here, not on the device's thread.
-    simulation.reach();
+    simulation.clearance();
     Ok(Arc::new(simulation))
 }
 

@@ -76,15 +76,15 @@ device_struct! {
         pub window_scale: f32,
         /// See `window_scale`.
         pub window_offset: f32,
-        /// Whether values go to the film instead of colours.
+        /// 1 if values go to the film instead of colours.
         pub raw_values: i32,
-        /// Whether the cells' ranges are looked at.
+        /// 1 if the cells' ranges are looked at.
         pub skipping: i32,
     }
 }
 
 device_enum! {
-    /// What the kernel makes of the values along a ray.
+    /// The number that the kernel computes from the values along a ray.
     pub enum DeviceMode: "PROJECTION" {
         /// The greatest of sign times the value.
         Peak,

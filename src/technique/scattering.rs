@@ -1,4 +1,4 @@
-//! What `single_scatter` and `volume_path` share: their parameters, and the plan made of them.
+//! The parameters of `single_scatter` and `volume_path`, and the plan made of them.
 
 mod device;
 mod kernels;

@@ -30,7 +30,7 @@ fn e3(x: f64) -> f64 {
     0.5 * ((-x).exp() - x * e2(x))
 }
 
-/// What a slab sends back of a beam of irradiance 1 at right angles.
+/// The reflection of a slab under a beam of irradiance 1 at right angles.
 #[derive(Debug, Clone, Copy)]
 pub struct Reflected {
     /// The part of the irradiance, over all directions.
@@ -39,7 +39,7 @@ pub struct Reflected {
     pub radiance: f64,
 }
 
-/// What a slab of optical depth `depth` and albedo ω sends back that was scattered at most `scatterings` times.
+/// The reflection of a slab of optical depth `depth` and albedo ω by light that was scattered at most `scatterings` times.
 ///
 /// Solves S(τ) = ω/4π e^(−τ) + ω/2 ∫ S(t) E₁(|τ − t|) dt in `cells` cells, where ∫ E₁ over a cell is a difference of E₂, by Neumann's
 /// series (a term is a scattering); then R = 2π ∫ S E₂ dτ and L = ∫ S e^(−τ) dτ.

@@ -59,7 +59,7 @@ device_struct! {
         pub normal_index: [f32; 3],
         /// Half the slab, world units.
         pub half_thickness: f32,
-        /// Whether the slab shows its greatest or least value, not its mean.
+        /// 1 if the slab shows its greatest or least value, not its mean.
         pub peaks: i32,
         /// 1 to look for the greatest raw value, −1 for the least.
         pub sign: f32,
@@ -71,7 +71,7 @@ device_struct! {
         pub window_scale: f32,
         /// See `window_scale`.
         pub window_offset: f32,
-        /// Whether values go to the film instead of colours.
+        /// 1 if values go to the film instead of colours.
         pub raw_values: i32,
     }
 }

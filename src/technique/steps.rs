@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-/// What a grid can hold has a period of at least two voxels.
+/// A grid holds no period shorter than two voxels.
 const LONGEST_VOXELS: f64 = 2.0;
 
 /// A word of warning where steps are so long that they may pass over what is in the grid. An error that is told from what other

@@ -3,11 +3,11 @@
 use std::collections::HashMap;
 
 use cloudchamber::device::program::Source;
-use cloudchamber::device::{cells, develop};
+use cloudchamber::device::{cells, encode};
 use cloudchamber::technique;
 
 fn sources() -> Vec<Source> {
-    technique::ALL.iter().map(|t| (t.source)()).chain(cells::sources()).chain([develop::source()]).collect()
+    technique::ALL.iter().map(|t| (t.source)()).chain(cells::sources()).chain([encode::source()]).collect()
 }
 
 /// The names that a text defines, with what they stand for.

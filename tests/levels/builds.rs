@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use cloudchamber::device;
 use cloudchamber::device::program::{Source, Variant};
-use cloudchamber::device::{cells, develop};
+use cloudchamber::device::{cells, encode};
 use cloudchamber::technique;
 use cloudchamber::volume::VoxelType;
 use rayon::prelude::*;
@@ -24,7 +24,7 @@ fn compiler() -> &'static Compiler {
 
 /// The kernels of the techniques and those of the cells.
 fn sources() -> Vec<Source> {
-    technique::ALL.iter().map(|t| (t.source)()).chain(cells::sources()).chain([develop::source()]).collect()
+    technique::ALL.iter().map(|t| (t.source)()).chain(cells::sources()).chain([encode::source()]).collect()
 }
 
 /// One of a kernel's variants for a level: the types of voxels in turn, and of those of a type another at each level.

@@ -1,6 +1,6 @@
 //! The transfer function's table as a few polynomials, for those that are smooth but for some kinks, as most are.
 //!
-//! What 16 lanes see in eight steps differs little as a rule, so that it lies on one piece or two: then a cubic for the opacity and a
+//! The values of 16 lanes in eight steps differ little as a rule, so that they lie on one piece or two: then a cubic for the opacity and a
 //! line for each colour, with coefficients that all lanes share, take the place of 128 looks into the table. A function that
 //! takes more than [`PIECES`] has none, and is looked up. Which it is depends on the function alone, and which piece on the value
 //! alone, so that a picture does not depend on what is sampled together.
@@ -9,11 +9,11 @@ use crate::scene::transfer::TABLE_SIZE;
 
 /// Most pieces: lanes of a register. `PIECES` in `kernels/shared/optical.h`.
 pub const PIECES: usize = 16;
-/// How far an opacity may be off in parts of itself, so that a picture is by no more.
+/// An opacity may be off by this part of itself; then a picture is off by no more.
 const OPACITY_SLACK: f32 = 1.0 / 2048.0;
-/// How far it may be off besides, and that in parts of the greatest, for where it is next to nothing.
+/// An opacity may be off by this much besides, and by this part of the greatest, where it is next to nothing.
 const LEAST_SLACK: [f32; 2] = [1.0 / 262_144.0, 1.0 / 16_384.0];
-/// How far a colour may be off: an eighth of a level of 255.
+/// A colour may be off by this: an eighth of a level of 255.
 const COLOUR_SLACK: f32 = 1.0 / 2048.0;
 
 #[derive(Clone, Copy)]
@@ -61,7 +61,7 @@ impl Piece {
         piece
     }
 
-    /// Whether every entry of `first..=last` is met closely enough; `least` is what an opacity may be off anyway.
+    /// True if every entry of `first..=last` is met closely enough; `least` is what an opacity may be off anyway.
     fn holds(&self, entries: &[Entry], last: usize, least: f32) -> bool {
         (self.first..=last).all(|i| {
             let (Entry { color, opacity }, x) = (entries[i], (i - self.first) as f32);
@@ -83,14 +83,14 @@ impl Piece {
         let fits = |last: usize| Some(Self::through(entries, first, last)).filter(|p| p.holds(entries, last, least));
         // Two entries are met by a line.
         let (mut best, mut good) = (Self::through(entries, first, first + 1), first + 1);
-        let (mut bad, mut reach) = (end + 1, 2);
+        let (mut bad, mut length) = (end + 1, 2);
         while good < end && bad - good > 1 {
-            let last = (first + reach).min(end).min(if bad > end { end } else { (good + bad) / 2 });
+            let last = (first + length).min(end).min(if bad > end { end } else { (good + bad) / 2 });
             match fits(last) {
                 Some(piece) => (best, good) = (piece, last),
                 None => bad = last,
             }
-            reach *= 2;
+            length *= 2;
         }
         (best, good)
     }
@@ -152,7 +152,7 @@ mod tests {
         (0..TABLE_SIZE).map(entry).map(|(opacity, grey)| ([grey; 3], opacity)).collect()
     }
 
-    /// What the device makes of an entry's number: opacity and red.
+    /// The opacity and red that the device computes at an entry's number.
     fn seen(words: &[u32], x: f32) -> (f32, f32) {
         let column = |c: usize, i: usize| f32::from_bits(words[c * PIECES + i]);
         let i = (0..PIECES).rfind(|&i| x >= column(0, i)).expect("a piece");

@@ -1,4 +1,4 @@
-//! What `emission_absorption` has the device run.
+//! The plan of `emission_absorption`: its kernels, parameters and tables.
 
 use serde_json::Value;
 

@@ -35,7 +35,7 @@ fn default_falloff() -> f64 {
 }
 
 impl Region {
-    /// How much of it there is along one of its sides: 1 inside, falling to 0 at the ends.
+    /// Its share along one of its sides: 1 inside, falling to 0 at the ends.
     fn share(&self, [low, high]: [f64; 2], at: f64) -> f64 {
         let from_edge = (at - low).min(high - at) / (0.5 * (high - low));
         if from_edge < 0.0 {

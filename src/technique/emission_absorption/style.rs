@@ -1,4 +1,4 @@
-//! What a sample looks like beyond its transfer function: `kernels/shared/style.h`.
+//! Styles of samples beyond the transfer function: `kernels/shared/style.h`.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -123,7 +123,7 @@ pub struct Styles<'a> {
 }
 
 impl Styles<'_> {
-    /// Whether any is asked for.
+    /// True if any is asked for.
     pub fn any(&self) -> bool {
         self.gradient_opacity.is_some()
             || self.silhouette.is_some()

@@ -1,4 +1,4 @@
-//! What `isosurface` has the device run.
+//! The plan of `isosurface`: its kernels, parameters and tables.
 
 use serde_json::{Value, json};
 
@@ -15,9 +15,9 @@ use crate::technique::steps::coarse_step;
 use crate::technique::{CellUse, View, ViewPlan, view_text};
 use crate::volume::{Volume, VoxelType};
 
-/// How closely a crossing is located, in voxels.
+/// The tolerance of a crossing, in voxels.
 const TOLERANCE_VOXELS: f64 = 1e-4;
-/// The same in parts of the way through the volume: what single precision can tell apart, a few times over.
+/// The same in parts of the way through the volume: a few times the resolution of single precision.
 const TOLERANCE_OF_WAY: f64 = 3e-7;
 /// A ray through transparent surfaces ends at this opacity.
 const OPACITY_THRESHOLD: f64 = 0.999;

@@ -1,4 +1,4 @@
-//! Which surfaces are asked for.
+//! The surfaces of a request.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -11,7 +11,7 @@ use crate::volume::Volume;
 pub const MOST_SURFACES: usize = 8;
 /// Linear colour of bone that has been lying about.
 const IVORY: [f64; 3] = [0.83, 0.74, 0.58];
-/// What shows bone in a CT scan, Hounsfield units.
+/// The isovalue of bone in a CT scan, Hounsfield units.
 const BONE_HOUNSFIELD: f64 = 300.0;
 
 /// A surface of one value.
@@ -45,7 +45,7 @@ impl Surface {
     }
 }
 
-/// What a schema cannot say: no two surfaces have one value.
+/// Checks what the schema cannot say: no two surfaces have one value.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the later of the two under `at`.
@@ -59,7 +59,7 @@ pub fn check(surfaces: &[Surface], at: &str) -> Result<()> {
     Ok(())
 }
 
-/// The isovalue where a request is silent: bone in Hounsfield units, else the threshold that tells two classes of voxels apart
+/// The isovalue where a request is silent: bone in Hounsfield units, else the threshold that separates two classes of voxels
 /// best, by the variance between them (Otsu, "A Threshold Selection Method from Gray-Level Histograms", IEEE Transactions on
 /// Systems, Man and Cybernetics 9(1), 1979).
 pub fn default_isovalue(volume: &Volume) -> f64 {
@@ -77,8 +77,8 @@ pub fn default_isovalue(volume: &Volume) -> f64 {
     for (i, &count) in histogram.counts.iter().enumerate().take(bins.saturating_sub(1)) {
         below += count as f64;
         below_sum += i as f64 * count as f64;
-        let apart = below_sum / below - (sum - below_sum) / (total - below);
-        let between = below * (total - below) * apart * apart;
+        let difference = below_sum / below - (sum - below_sum) / (total - below);
+        let between = below * (total - below) * difference * difference;
         if between > best {
             (best, at) = (between, i + 1);
         }

@@ -1,4 +1,4 @@
-//! How matter attenuates gamma photons: published mass attenuation coefficients, and the part of them that is Compton scattering.
+//! The attenuation of gamma photons in matter: published mass attenuation coefficients, and the part of them that is Compton scattering.
 //!
 //! The tables are of Hubbell & Seltzer, NISTIR 5632 (1995). Of each collision the part n_e σ_KN(E) / µ(E) is Compton scattering (n_e
 //! electrons per volume, free and at rest); the rest, which is photoelectric absorption and a little coherent scattering, is absorbed

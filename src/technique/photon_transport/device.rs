@@ -1,9 +1,9 @@
-//! What `kernels/photon_transport.cl` is told.
+//! Parameters and numbers of `kernels/photon_transport.cl`.
 
 use crate::{device_enum, device_struct};
 
 device_enum! {
-    /// Where the media are (`kernels/shared/medium.h`).
+    /// The geometry of the media (`kernels/shared/medium.h`).
     pub enum Media: "MEDIA" {
         /// One everywhere.
         Uniform,
@@ -37,7 +37,7 @@ device_enum! {
 }
 
 device_enum! {
-    /// What is at the ends of the media.
+    /// The boundary condition at an end of the media.
     pub enum BoundaryKind: "BOUNDARY" {
         /// Nothing.
         Absorbing,
@@ -49,7 +49,7 @@ device_enum! {
 }
 
 device_enum! {
-    /// What the grid holds, and by which estimator.
+    /// The quantity in the grid, and its estimator.
     pub enum Tally: "TALLY" {
         /// Absorbed energy, by collisions.
         Absorbed,
@@ -65,7 +65,7 @@ device_enum! {
 }
 
 device_enum! {
-    /// Where photons come from (`kernels/shared/photon.h`).
+    /// The kinds of source (`kernels/shared/photon.h`).
     pub enum SourceKind: "SOURCE" {
         /// One ray.
         Pencil,
@@ -124,7 +124,7 @@ device_enum! {
 }
 
 device_struct! {
-    /// Which histories a launch takes.
+    /// The histories of a launch.
     pub struct FieldPass {
         /// Number of the first history, low and high word.
         pub first: [u32; 2],
@@ -134,9 +134,9 @@ device_struct! {
         pub per_item: u32,
         /// One work-item in so many works.
         pub stride: u32,
-        /// Whether each working item has a grid of its own, and takes histories until there are no more.
+        /// 1 if each working item has a grid of its own, and takes histories until there are no more.
         pub own_grids: i32,
-        /// Where in the ledger it says how many have been taken.
+        /// The entry of the ledger that counts the histories that have been taken.
         pub taken_at: i32,
         /// The seed, low and high word.
         pub seed: [u32; 2],
@@ -144,7 +144,7 @@ device_struct! {
 }
 
 device_struct! {
-    /// The kernel's own parameters. Lengths are in mm from the box's corner; `at_` says where in the table something starts.
+    /// The kernel's own parameters. Lengths are in mm from the box's corner; `at_` is the place in the table at which something starts.
     pub struct PhotonTransport {
         /// Voxels along x, y, z.
         pub grid: [i32; 3],
@@ -154,20 +154,20 @@ device_struct! {
         pub voxels_per_mm: [f32; 3],
         /// Size of the grid.
         pub size_mm: [f32; 3],
-        /// Where the media start.
+        /// The lower ends of the media.
         pub low_mm: [f32; 3],
-        /// Where they end.
+        /// Their upper ends.
         pub high_mm: [f32; 3],
-        /// Whether they go further than the grid.
+        /// 1 if they go further than the grid.
         pub endless: i32,
-        /// What is at their ends: a [`BoundaryKind`] per axis.
+        /// A [`BoundaryKind`] per axis.
         pub boundary: [i32; 3],
-        /// Cells between walls, along each axis.
-        pub walls: [i32; 3],
-        /// From wall to wall.
-        pub wall_mm: [f32; 3],
-        /// Walls per mm; 0 where there is but one cell.
-        pub walls_per_mm: [f32; 3],
+        /// Cells of the DDA along each axis.
+        pub cells: [i32; 3],
+        /// Sides of a cell.
+        pub cell_mm: [f32; 3],
+        /// Cells per mm; 0 where there is but one cell.
+        pub cells_per_mm: [f32; 3],
         /// Media that the table has room for.
         pub media: i32,
         /// The refractive index, where there is but one.
@@ -178,7 +178,7 @@ device_struct! {
         pub at_layers: i32,
         /// Labels or densities of the voxels.
         pub at_voxels: i32,
-        /// Bytes of a label: 1 or 2. With voxels' walls a byte follows that says how far around it is the same.
+        /// Bytes of a label: 1 or 2. Where voxels are cells, a byte with its clearance follows.
         pub label_bytes: i32,
         /// Majorants of the blocks.
         pub at_blocks: i32,
@@ -194,11 +194,11 @@ device_struct! {
         pub beam_mm: [f32; 2],
         /// Refractive index outside.
         pub outside_index: f32,
-        /// Whether the outer faces reflect and refract.
+        /// 1 if the outer faces reflect and refract.
         pub fresnel: i32,
-        /// Whether what they reflect of the beam is lost.
+        /// 1 if what they reflect of the beam is lost.
         pub specular_entry: i32,
-        /// Whether refractive indices differ inside.
+        /// 1 if refractive indices differ inside.
         pub mismatch: i32,
         /// Optical path after which a photon is taken out.
         pub gate_mm: f32,
@@ -206,9 +206,9 @@ device_struct! {
         pub march_step_mm: f32,
         /// A [`SourceKind`].
         pub source_type: i32,
-        /// Where it is.
+        /// Its position.
         pub source: [f32; 3],
-        /// Where it shines, unit length.
+        /// Its direction, unit length.
         pub source_axis: [f32; 3],
         /// Its edges, or the axes of its disk times its radius.
         pub source_u: [f32; 3],
@@ -220,7 +220,7 @@ device_struct! {
         pub roulette_threshold: f32,
         /// Probability to survive it.
         pub roulette_survival: f32,
-        /// What is added up: a [`Tally`].
+        /// The quantity in the grid: a [`Tally`].
         pub tally: i32,
         /// Deposits of length are times this.
         pub deposit_scale: f32,
@@ -238,7 +238,7 @@ device_struct! {
         pub gamma_rows_per_log2: f32,
         /// Attenuation and albedo of each medium by energy.
         pub at_gamma: i32,
-        /// What the gather looks from.
+        /// The eye of the gather.
         pub eye_mm: [f32; 3],
     }
 }

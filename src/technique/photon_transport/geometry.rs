@@ -1,4 +1,4 @@
-//! Where which medium is: in the whole box, in layers, by a label volume or by a density.
+//! The geometry of the media: one in the whole box, in layers, by a label volume or by a density.
 
 use std::sync::OnceLock;
 
@@ -6,10 +6,10 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::json;
 
+use super::clearance::clearances;
 use super::layers::{self, Layer};
 use super::medium::Medium;
 use super::parameters::Parameters;
-use super::reach::reaches;
 use crate::error::{Error, Result};
 use crate::scene::phase::Phase;
 use crate::volume::{Store, Volume, builtin};
@@ -30,7 +30,7 @@ pub struct GridRequest {
     seed: Option<u64>,
 }
 
-/// What is where.
+/// The place of each medium.
 #[derive(Debug, Clone)]
 pub enum Where {
     /// One medium.
@@ -41,8 +41,8 @@ pub enum Where {
     Labels {
         /// Its number.
         of_voxel: Vec<u16>,
-        /// See [`Geometry::reach`].
-        reach: OnceLock<Vec<u8>>,
+        /// See [`Geometry::clearance`].
+        clearance: OnceLock<Vec<u8>>,
     },
     /// The medium's extinction times this.
     Density(Vec<f32>),
@@ -51,7 +51,7 @@ pub enum Where {
 /// A box of media with its grid.
 #[derive(Debug, Clone)]
 pub struct Geometry {
-    /// What is where.
+    /// The place of each medium.
     pub place: Where,
     /// The media, by number.
     pub media: Vec<Medium>,
@@ -59,7 +59,7 @@ pub struct Geometry {
     pub size_mm: [f64; 3],
     /// Its voxels.
     pub dims: [usize; 3],
-    /// Whether it is the lecture's chamber.
+    /// True if it is the lecture's chamber.
     pub chamber: bool,
 }
 
@@ -189,7 +189,7 @@ impl Geometry {
                     format!("whole numbers from 0 to {}", media.len() - 1),
                 )
             })?;
-        let place = Where::Labels { of_voxel, reach: OnceLock::new() };
+        let place = Where::Labels { of_voxel, clearance: OnceLock::new() };
         Ok(Self { place, media: media.to_vec(), size_mm, dims, chamber: false })
     }
 
@@ -235,20 +235,20 @@ impl Geometry {
         Self { place: Where::Density(density), media: vec![medium], size_mm, dims, chamber: true }
     }
 
-    /// Whether its photons are gammas.
+    /// True if its photons are gammas.
     pub fn is_gamma(&self) -> bool {
         self.media.iter().any(|m| m.phase.kind == "klein_nishina")
     }
 
-    /// Whether refractive indices differ within it.
+    /// True if refractive indices differ within it.
     pub fn bends(&self) -> bool {
         self.media.iter().any(|m| m.index != self.media[0].index)
     }
 
-    /// How far around each voxel its label is the same (see [`reaches`]), for labels: worked out when it is first asked for.
-    pub fn reach(&self) -> Option<&[u8]> {
+    /// The clearance of each voxel (see [`clearances`]), for labels: computed when first asked for.
+    pub fn clearance(&self) -> Option<&[u8]> {
         match &self.place {
-            Where::Labels { of_voxel, reach } => Some(reach.get_or_init(|| reaches(of_voxel, self.dims))),
+            Where::Labels { of_voxel, clearance } => Some(clearance.get_or_init(|| clearances(of_voxel, self.dims))),
             _ => None,
         }
     }

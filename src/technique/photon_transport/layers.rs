@@ -52,7 +52,7 @@ fn thickness_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
 }
 
 impl Layer {
-    /// What it is made of.
+    /// Its medium.
     pub fn medium(&self) -> Medium {
         let (mu_a_per_mm, mu_s_per_mm) = (self.mu_a_per_mm, self.mu_s_per_mm);
         Medium {
@@ -65,7 +65,7 @@ impl Layer {
     }
 }
 
-/// Where each layer ends, mm; the last may be infinite.
+/// The ends of the layers, mm; the last may be infinite.
 ///
 /// # Errors
 /// A thickness that is none.

@@ -42,14 +42,14 @@ impl Medium {
         self.mu_a_per_mm + self.mu_s_per_mm
     }
 
-    /// What a collision scatters; 1 where nothing collides.
+    /// The scattered part of a collision; 1 where nothing collides.
     pub fn albedo(&self) -> f64 {
         let extinction = self.extinction_per_mm();
         if extinction > 0.0 { self.mu_s_per_mm / extinction } else { 1.0 }
     }
 }
 
-/// How many media the kernel's table has room for: up to 16 fit in a register.
+/// The number of media that the kernel's table has room for: up to 16 fit in a register.
 pub fn room(media: usize) -> usize {
     media.max(16)
 }

@@ -1,4 +1,4 @@
-//! What `photon_transport` has the device run.
+//! The plan of `photon_transport`: its kernels, parameters and tables.
 
 use std::f64::consts::PI;
 
@@ -15,7 +15,7 @@ use crate::technique::FieldPlan;
 
 /// Light in a vacuum, mm per ns.
 const LIGHT_MM_PER_NS: f64 = 299.792_458;
-/// What stands for no end.
+/// Stands for no end.
 const ENDLESS_MM: f32 = 1e30;
 
 type Features = [(&'static str, i32); 3];
@@ -80,7 +80,7 @@ impl Simulation {
         std::array::from_fn(|a| self.geometry.size_mm[a] / self.geometry.dims[a] as f64)
     }
 
-    /// What a deposit is multiplied with, so that it is neither too large nor too small for the fixed point; undone in the end.
+    /// The scale of deposits, which makes them neither too large nor too small for the fixed point; the result is divided by it.
     pub(super) fn deposit_scale(&self) -> f64 {
         if self.is_absorbed() && !self.track { 1.0 } else { 1.0 / self.spacing_mm()[0] }
     }
@@ -104,31 +104,31 @@ impl Simulation {
         }
     }
 
-    /// Walls at which the kernel looks again: voxels, layers, blocks, or the box alone.
-    fn walls(&self, device: &mut PhotonTransport, table: &mut Vec<f32>) {
+    /// The cells of the DDA: voxels, layers, blocks, or the box alone.
+    fn cells(&self, device: &mut PhotonTransport, table: &mut Vec<f32>) {
         let g = &self.geometry;
-        device.walls = [1; 3];
+        device.cells = [1; 3];
         match (&g.place, self.tracking) {
             (Where::Labels { .. } | Where::Density(_), Tracking::Exact) => {
-                device.walls = g.dims.map(|n| n as i32);
-                device.wall_mm = self.spacing_mm().map(|s| s as f32);
+                device.cells = g.dims.map(|n| n as i32);
+                device.cell_mm = self.spacing_mm().map(|s| s as f32);
             }
-            (Where::Layers(ends), Tracking::Exact) => device.walls[2] = ends.len() as i32,
+            (Where::Layers(ends), Tracking::Exact) => device.cells[2] = ends.len() as i32,
             (_, Tracking::Delta | Tracking::Weighted) => {
                 let m = majorants(&self.parameters, g);
-                device.walls = m.blocks.map(|n| n as i32);
+                device.cells = m.blocks.map(|n| n as i32);
                 let spacing = self.spacing_mm();
-                device.wall_mm = std::array::from_fn(|a| (m.voxels[a] as f64 * spacing[a]) as f32);
+                device.cell_mm = std::array::from_fn(|a| (m.voxels[a] as f64 * spacing[a]) as f32);
                 device.at_blocks = append(table, m.per_mm);
             }
             _ => {}
         }
-        device.walls_per_mm = std::array::from_fn(|a| if device.walls[a] > 1 { 1.0 / device.wall_mm[a] } else { 0.0 });
+        device.cells_per_mm = std::array::from_fn(|a| if device.cells[a] > 1 { 1.0 / device.cell_mm[a] } else { 0.0 });
     }
 
-    /// How far around each voxel a photon need not look again. Tracks are scored voxel by voxel.
-    pub(super) fn reach(&self) -> Option<&[u8]> {
-        if self.tracking == Tracking::Exact && !self.track { self.geometry.reach() } else { None }
+    /// The clearance of each voxel, where photons may cross several at once: tracks are scored voxel by voxel.
+    pub(super) fn clearance(&self) -> Option<&[u8]> {
+        if self.tracking == Tracking::Exact && !self.track { self.geometry.clearance() } else { None }
     }
 
     fn bounds(&self, device: &mut PhotonTransport) {
@@ -182,7 +182,7 @@ impl Simulation {
         };
         self.source.apply(&mut device);
         self.bounds(&mut device);
-        self.walls(&mut device, &mut table);
+        self.cells(&mut device, &mut table);
         match &g.place {
             Where::Box => {}
             Where::Layers(ends) => {
@@ -193,11 +193,11 @@ impl Simulation {
             Where::Labels { of_voxel, .. } => {
                 // As bytes where they fit, so that more of them are near; a word more, for words are read from any byte on.
                 let label_bytes = if g.media.len() <= 256 { 1 } else { 2 };
-                let (with_reach, reach) = (self.tracking == Tracking::Exact, self.reach());
-                let mut bytes = Vec::with_capacity((label_bytes + usize::from(with_reach)) * of_voxel.len() + 8);
+                let (with_clearance, clearance) = (self.tracking == Tracking::Exact, self.clearance());
+                let mut bytes = Vec::with_capacity((label_bytes + usize::from(with_clearance)) * of_voxel.len() + 8);
                 for (i, label) in of_voxel.iter().enumerate() {
                     bytes.extend(&label.to_le_bytes()[..label_bytes]);
-                    bytes.extend(with_reach.then(|| reach.map_or(0, |r| r[i])));
+                    bytes.extend(with_clearance.then(|| clearance.map_or(0, |r| r[i])));
                 }
                 bytes.resize(bytes.len().next_multiple_of(4) + 4, 0);
                 let words = bytes.chunks_exact(4).map(|w| f32::from_le_bytes([w[0], w[1], w[2], w[3]]));
@@ -214,7 +214,7 @@ impl Simulation {
             device.gamma_rows_per_log2 = ((ROWS - 1) as f64 / (source_kev / LEAST_KEV).log2().max(1e-6)) as f32;
             device.at_gamma = append(&mut table, attenuation::rows(&g.media, source_kev));
         }
-        device.most_steps = self.most_steps(device.walls);
+        device.most_steps = self.most_steps(device.cells);
         let mut bins = 0;
         if let Some(histogram) = &p.exit_histogram {
             device.radius_bins = histogram.radius_edges_mm.len() as i32 - 1;
@@ -237,10 +237,10 @@ impl Simulation {
     }
 
     /// In a thin box only light that total reflection keeps in takes many steps: without absorption it would never end.
-    fn most_steps(&self, walls: [i32; 3]) -> i32 {
+    fn most_steps(&self, cells: [i32; 3]) -> i32 {
         let across: f64 = self.geometry.size_mm.iter().sum();
         let thin = self.extinction_range_per_mm[1] * across < 0.1;
-        if thin { 5_000 + 100 * walls.iter().sum::<i32>() } else { 1_000_000 }
+        if thin { 5_000 + 100 * cells.iter().sum::<i32>() } else { 1_000_000 }
     }
 
     /// The march's step: the request's, or a tenth of the shortest mean free path.
@@ -251,7 +251,7 @@ impl Simulation {
             .unwrap_or(shortest.min(self.geometry.size_mm.iter().copied().fold(f64::INFINITY, f64::min)))
     }
 
-    /// Where the gather looks from: the request's eye, or one far before the entry face.
+    /// The eye of the gather: the request's, or one far before the entry face.
     fn eye_mm(&self) -> [f64; 3] {
         let size = self.geometry.size_mm;
         self.parameters.eye_mm.unwrap_or([0.5 * size[0], 0.5 * size[1], -3.0 * size[2]])

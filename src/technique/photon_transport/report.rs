@@ -1,4 +1,4 @@
-//! What a simulation came to: the ledger as fractions of the launched weight, and what else was counted.
+//! The result of a simulation: the ledger as fractions of the launched weight, and the counts.
 
 use serde_json::{Map, Value, json};
 

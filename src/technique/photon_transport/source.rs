@@ -1,4 +1,4 @@
-//! Where photons come from.
+//! The sources of photons.
 
 use glam::DVec3;
 use schemars::JsonSchema;
@@ -42,9 +42,9 @@ pub struct LightSource {
 pub struct Source {
     /// Its kind.
     pub kind: SourceKind,
-    /// Where, from the box's corner.
+    /// Its position from the box's corner.
     pub position_mm: DVec3,
-    /// Whither, of unit length.
+    /// Its direction, of unit length.
     pub axis: DVec3,
     u_mm: DVec3,
     v_mm: DVec3,
@@ -119,7 +119,7 @@ impl LightSource {
 }
 
 impl Source {
-    /// Whether any of its parallel rays meets the box.
+    /// True if any of its parallel rays meets the box.
     fn meets(&self, size: DVec3) -> bool {
         let planar = self.kind == SourceKind::Planar;
         let places = (-8..=8).flat_map(|i| (-8..=8).map(move |k| (f64::from(i) / 8.0, f64::from(k) / 8.0)));

@@ -1,4 +1,4 @@
-//! How free paths are found, and why.
+//! The choice of a tracker, with its reason.
 
 use super::geometry::Geometry;
 use super::parameters::Parameters;
@@ -28,8 +28,8 @@ pub fn choose(p: &Parameters, geometry: &Geometry, track: bool, at: &str) -> Res
     Ok((tracking, format!("{}: {why}", tracking.name())))
 }
 
-/// How many walls of cubes a photon meets in a cube's side, on average over directions.
-const WALLS_PER_SIDE: f64 = 1.5;
+/// Boundaries of cubes that a photon meets in a cube's side, on average over directions.
+const BOUNDARIES_PER_SIDE: f64 = 1.5;
 /// Delta tracking is taken where it looks up less than this part of what voxels would.
 const CLEARLY_LESS: f64 = 0.7;
 
@@ -44,24 +44,26 @@ fn cheapest(p: &Parameters, geometry: &Geometry, track: bool) -> (Tracking, Stri
         return exact("the extinction changes with the energy, so no majorant holds");
     }
     if geometry.bends() {
-        return exact("from wall to wall, for light is bent there");
+        return exact("from one cell boundary to the next, for light is bent there");
     }
     if track {
         return exact("from voxel to voxel, where tracks are scored as well");
     }
     let mean = |v: &[f32]| v.iter().map(|e| f64::from(*e)).sum::<f64>() / v.len() as f64;
     let voxel_mm = (0..3).map(|a| geometry.size_mm[a] / geometry.dims[a] as f64).sum::<f64>() / 3.0;
-    // Where labels are the same around a voxel, walls are further apart.
-    let per_voxel =
-        |reach: &[u8]| reach.iter().map(|r| 1.0 / (2.0 * f64::from(*r) + 1.0)).sum::<f64>() / reach.len() as f64;
-    let walls = geometry.reach().map_or(1.0, per_voxel);
-    let by_voxels = walls * WALLS_PER_SIDE / voxel_mm + mean(&voxels);
+    // Voxels with a clearance are crossed in one step.
+    let per_voxel = |clearance: &[u8]| {
+        clearance.iter().map(|r| 1.0 / (2.0 * f64::from(*r) + 1.0)).sum::<f64>() / clearance.len() as f64
+    };
+    let boundaries = geometry.clearance().map_or(1.0, per_voxel);
+    let by_voxels = boundaries * BOUNDARIES_PER_SIDE / voxel_mm + mean(&voxels);
     let by_majorants = mean(&majorants(p, geometry).per_mm);
-    let numbers = format!("{by_majorants:.3} tentative collisions a mm for {by_voxels:.3} walls and collisions");
+    let numbers =
+        format!("{by_majorants:.3} tentative collisions a mm for {by_voxels:.3} cell boundaries and collisions");
     if by_majorants < CLEARLY_LESS * by_voxels && p.majorant.scale >= 1.0 {
         (Tracking::Delta, format!("delta: {numbers}"))
     } else {
-        exact(&format!("from wall to wall: delta tracking would make {numbers}"))
+        exact(&format!("from one cell boundary to the next: delta tracking would make {numbers}"))
     }
 }
 

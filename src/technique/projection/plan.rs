@@ -1,4 +1,4 @@
-//! What `projection` has the device run.
+//! The plan of `projection`: its kernels, parameters and tables.
 
 use serde_json::Value;
 

@@ -1,9 +1,9 @@
-//! What the kernels of scattering views are told.
+//! Parameters of the kernels of scattering views.
 
 use crate::{device_enum, device_struct};
 
 device_enum! {
-    /// How the density of the medium lies in the volume.
+    /// The variation of density in the volume.
     pub enum Density: "DENSITY" {
         /// It is the same everywhere.
         Constant,
@@ -13,17 +13,17 @@ device_enum! {
 }
 
 device_struct! {
-    /// Their own parameters. Places are in index units, lengths in world units; `at_` says where in the table something starts.
+    /// Their own parameters. Positions are in index units, lengths in world units; `at_` says where in the table something starts.
     pub struct Scattering {
         /// Column-major map from index to world, three rows and four columns.
         pub world_from_index: [f32; 12],
-        /// Cells between walls, along each axis.
-        pub walls: [i32; 3],
-        /// Voxels from wall to wall.
-        pub wall_voxels: [f32; 3],
-        /// Walls per voxel; 0 where there is but one cell.
-        pub walls_per_voxel: [f32; 3],
-        /// Whether one majorant stands for the whole volume.
+        /// Cells of the DDA along each axis.
+        pub cells: [i32; 3],
+        /// Voxels along a cell's sides.
+        pub voxels_per_cell: [f32; 3],
+        /// Cells per voxel; 0 where there is but one cell.
+        pub cells_per_voxel: [f32; 3],
+        /// 1 if one majorant stands for the whole volume.
         pub whole: i32,
         /// density = raw × scale + offset, from 0 to `density_most`.
         pub density_scale: f32,
@@ -39,13 +39,13 @@ device_struct! {
         pub sigma_most: f32,
         /// The three over the greatest.
         pub colour: [f32; 3],
-        /// Whether they differ.
+        /// 1 if they differ.
         pub chromatic: i32,
         /// Majorant at a density of 1; of the whole volume where there is but one, or its extinction where it is the same everywhere.
         pub majorant: f32,
         /// The march's step.
         pub march_step: f32,
-        /// What of a collision is scattered, by colour.
+        /// The scattered part of a collision, by colour.
         pub albedo: [f32; 3],
         /// Radiance emitted per unit of optical depth, by colour.
         pub emission: [f32; 3],
@@ -57,11 +57,11 @@ device_struct! {
         pub lights: i32,
         /// The lights.
         pub at_lights: i32,
-        /// Whether rays can meet any of them.
+        /// 1 if rays can meet any of them.
         pub discs: i32,
-        /// Whether there is a sky.
+        /// 1 if there is a sky.
         pub sky: i32,
-        /// Whether the eye sees it.
+        /// 1 if the eye sees it.
         pub sky_visible: i32,
         /// Its radiance straight above.
         pub sky_zenith: [f32; 3],
@@ -69,11 +69,11 @@ device_struct! {
         pub sky_horizon: [f32; 3],
         /// Straight below.
         pub sky_ground: [f32; 3],
-        /// Which way is up.
+        /// Upwards.
         pub sky_up: [f32; 3],
-        /// Whether a ray in any direction may meet light: a sky, lights that have a size, or emission.
+        /// 1 if a ray in any direction may meet light: a sky, lights that have a size, or emission.
         pub lit_by_chance: i32,
-        /// Whether lights are aimed at.
+        /// 1 if lights are aimed at.
         pub next_event: i32,
         /// A path ends at a collision after so many.
         pub max_scatterings: i32,
@@ -81,7 +81,7 @@ device_struct! {
         pub roulette_threshold: f32,
         /// Samples of more luminance than this are scaled to it; 0: none are.
         pub clamp_luminance: f32,
-        /// Whether places on a ray are also chosen by the angle under which they see a light.
+        /// 1 if points on a ray are also sampled by the angle to a light (equiangular sampling).
         pub equiangular: i32,
         /// The mean extinction.
         pub sigma_mean: f32,

@@ -1,4 +1,4 @@
-//! What scattering views have the device run.
+//! The plan of scattering views: their kernel, parameters and tables.
 
 use serde_json::{Value, json};
 
@@ -57,7 +57,7 @@ impl Scatterer {
         Ok(Self { kernel, parameters, lights })
     }
 
-    /// Whether the density is the same everywhere.
+    /// True if the density is the same everywhere.
     fn is_box(volume: &Volume) -> bool {
         volume.non_finite() == 0 && volume.range()[0] == volume.range()[1]
     }
@@ -124,8 +124,8 @@ impl Scatterer {
         (0..n).step_by(stride).map(density).sum::<f64>() / count
     }
 
-    /// Walls, and what a free path is drawn with between them.
-    fn walls(&self, volume: &Volume, features: &Features, greatest_sigma: f64, device: &mut Scattering) {
+    /// The cells of the DDA, and the majorant of free paths within them.
+    fn cells(&self, volume: &Volume, features: &Features, greatest_sigma: f64, device: &mut Scattering) {
         let is = |feature: (&'static str, i32)| features.contains(&feature);
         let p = &self.parameters;
         let grid = is(("DENSITY", Density::Grid.code()));
@@ -138,9 +138,9 @@ impl Scatterer {
         };
         for a in 0..3 {
             let n = volume.dims()[a];
-            device.walls[a] = side.map_or(1, |s| n.div_ceil(s) as i32);
-            device.wall_voxels[a] = side.unwrap_or(n) as f32;
-            device.walls_per_voxel[a] = if device.walls[a] > 1 { 1.0 / device.wall_voxels[a] } else { 0.0 };
+            device.cells[a] = side.map_or(1, |s| n.div_ceil(s) as i32);
+            device.voxels_per_cell[a] = side.unwrap_or(n) as f32;
+            device.cells_per_voxel[a] = if device.cells[a] > 1 { 1.0 / device.voxels_per_cell[a] } else { 0.0 };
         }
         let scale = if grid { p.majorant.scale } else { 1.0 };
         device.whole = i32::from(!local);
@@ -210,7 +210,7 @@ impl View for Scatterer {
             sigma_mean: (most * self.mean_density(volume)) as f32,
             ..Scattering::default()
         };
-        self.walls(volume, features, most, &mut device);
+        self.cells(volume, features, most, &mut device);
         self.sky(volume, &mut device);
         Ok(bytemuck::bytes_of(&device).to_vec())
     }

@@ -1,4 +1,4 @@
-//! What `slice` has the device run.
+//! The plan of `slice`: its kernels, parameters and tables.
 
 use glam::DVec3;
 

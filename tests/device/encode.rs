@@ -2,7 +2,7 @@
 
 use cloudchamber::device::Buffer;
 use cloudchamber::device::Device;
-use cloudchamber::device::develop::{Developer, Look, PADDING, Set, curve};
+use cloudchamber::device::encode::{EncodeSettings, Encoder, PADDING, Set, curve};
 use cloudchamber::film::picture::Background;
 use cloudchamber::film::{Apart, Samples, Sums, Tiles};
 
@@ -137,13 +137,13 @@ fn numbers(s: &Sums) -> Vec<f64> {
 fn check(device: &mut Device, film: &Samples, control: Option<&Samples>, background: Background) {
     let size = [film.width * film.stride, film.height * film.stride];
     let curve = curve(device).unwrap();
-    let mut developer = Developer::new(device, &curve, size, background, None).unwrap();
+    let mut encoder = Encoder::new(device, &curve, size, background, None).unwrap();
     let (main, other) = (upload(device, film), control.map(|c| upload(device, c)));
-    let look = Look { size, background, opacity_threshold: 0.99, deviations: true };
+    let look = EncodeSettings { size, background, opacity_threshold: 0.99, deviations: true };
     let set = |buffer, samples| Set { buffer, samples };
     let control_set = control.zip(other.as_ref()).map(|(samples, buffer)| set(buffer, samples));
-    let sums = developer.develop(device, set(&main, film), control_set, &look).unwrap();
-    let picture = developer.picture(device).unwrap();
+    let sums = encoder.encode(device, set(&main, film), control_set, &look).unwrap();
+    let picture = encoder.picture(device).unwrap();
     let (values, clipped) = plain_picture(film, size, background);
     let expected =
         Sums { control: control.map(|c| plain_apart(film, c)), ..plain(film, 0.99, device.info().lanes as usize) };

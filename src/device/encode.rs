@@ -1,5 +1,5 @@
-//! Films developed on the device: the picture in sRGB bytes and the sums that its error is made of. The film itself, with 20 bytes a
-//! pixel, stays where it is until somebody asks for it.
+//! Films are encoded on the device: as the picture in sRGB bytes, and as the sums that its error is made of. The film itself, with 20 bytes
+//! a pixel, stays there until somebody asks for it.
 
 use std::rc::Rc;
 
@@ -61,8 +61,8 @@ pub const PADDING: usize = 256;
 const TABLE_PADDING: usize = 8;
 
 device_struct! {
-    /// What the kernel is told.
-    pub struct Develop {
+    /// Parameters of the kernel.
+    pub struct Encode {
         /// Size of the film in its own pixels.
         pub width: i32,
         /// Its rows.
@@ -73,11 +73,11 @@ device_struct! {
         pub picture_width: i32,
         /// Its rows.
         pub picture_height: i32,
-        /// Whether the picture has an alpha channel in place of a background.
+        /// 1 if the picture has an alpha channel in place of a background.
         pub transparent: i32,
         /// The background, linear.
         pub behind: [f32; 3],
-        /// What still gets through where rays end.
+        /// The transmittance at which rays end.
         pub ended: f32,
         /// Samples of a pixel.
         pub count: i32,
@@ -85,13 +85,13 @@ device_struct! {
         pub tile: i32,
         /// Tiles across.
         pub tiles_wide: i32,
-        /// Whether squared deviations are looked at.
+        /// 1 if squared deviations are looked at.
         pub deviations: i32,
         /// Pixels across of the control,
         pub control_width: i32,
         /// down, or 0 where there is none,
         pub control_height: i32,
-        /// and how many of the film's pixels they are apart.
+        /// and its stride in the film's pixels.
         pub control_stride: i32,
     }
 }
@@ -101,32 +101,32 @@ device_struct! {
 pub struct Set<'a> {
     /// Means, then squared deviations (`kernels/shared/film.h`), and [`PADDING`].
     pub buffer: &'a Buffer,
-    /// What they are, without their values.
+    /// Their size and count, without their values.
     pub samples: &'a Samples,
 }
 
-/// How a film is developed.
+/// The way a film is encoded.
 #[derive(Debug, Clone, Copy)]
-pub struct Look {
+pub struct EncodeSettings {
     /// Size of the picture.
     pub size: [usize; 2],
-    /// What is behind the volume.
+    /// The background.
     pub background: Background,
     /// Opacity at which rays end.
     pub opacity_threshold: f64,
-    /// Whether squared deviations are looked at: of one sample that was finite everywhere there are none.
+    /// True if squared deviations are looked at: of one sample that was finite everywhere there are none.
     pub deviations: bool,
 }
 
 fn variant(whole: bool) -> Variant {
-    Variant::new("develop", None, if whole { &[("WHOLE", 1)] } else { &[("WHOLE", 0)] })
+    Variant::new("encode", None, if whole { &[("WHOLE", 1)] } else { &[("WHOLE", 0)] })
 }
 
 /// The kernel.
 pub fn source() -> Source {
     Source {
-        kernel: "develop",
-        structs: || Develop::opencl_text() + &FilmSum::opencl_text() + &ControlSum::opencl_text(),
+        kernel: "encode",
+        structs: || Encode::opencl_text() + &FilmSum::opencl_text() + &ControlSum::opencl_text(),
         variants: || [true, false].map(variant).to_vec(),
         common: 2,
     }
@@ -137,7 +137,7 @@ fn across(lanes: usize) -> usize {
     if lanes == 1 { 32 } else { 8 * lanes }
 }
 
-/// The curve of sRGB on the device, for all who develop there.
+/// The curve of sRGB on the device, for all that is encoded there.
 ///
 /// # Errors
 /// [`crate::error::Error::Internal`] when the device has no room.
@@ -145,8 +145,8 @@ pub fn curve(device: &Device) -> Result<Rc<Buffer>> {
     device.upload(srgb::table(), TABLE_PADDING).map(Rc::new)
 }
 
-/// Memory that films of one picture are developed in, and the curve of sRGB.
-pub struct Developer {
+/// The memory for encoding the films of one picture, and the curve of sRGB.
+pub struct Encoder {
     settings: Buffer,
     curve: Rc<Buffer>,
     picture: Buffer,
@@ -155,7 +155,7 @@ pub struct Developer {
     size: [usize; 2],
 }
 
-impl Developer {
+impl Encoder {
     /// Room for a picture, in the memory of the one `before` where that is as large; `curve` is [`curve`]'s.
     ///
     /// # Errors
@@ -173,7 +173,7 @@ impl Developer {
         let channels = background.channels();
         let (picture, sums) = before.map(|b| (b.picture, b.sums)).unzip();
         Ok(Self {
-            settings: device.allocate(size_of::<Develop>())?,
+            settings: device.allocate(size_of::<Encode>())?,
             curve: curve.clone(),
             picture: device.allocate_in(picture, channels * size[0] * size[1])?,
             sums: sums.map_or_else(|| device.allocate(1), Ok)?,
@@ -187,11 +187,17 @@ impl Developer {
         self.picture.len() + self.sums.len()
     }
 
-    /// Develops `main`, measured against `control`: what its error is made of. The picture is there to be read then.
+    /// Encodes `main` and returns the sums that its error against `control` is made of. Then the picture can be read.
     ///
     /// # Errors
     /// [`crate::error::Error::Internal`] when the device has no room or the kernel fails.
-    pub fn develop(&mut self, device: &Device, main: Set<'_>, control: Option<Set<'_>>, look: &Look) -> Result<Sums> {
+    pub fn encode(
+        &mut self,
+        device: &Device,
+        main: Set<'_>,
+        control: Option<Set<'_>>,
+        look: &EncodeSettings,
+    ) -> Result<Sums> {
         let (width, height) = (main.samples.width, main.samples.height);
         let whole = main.samples.stride == 1 && [width, height] == self.size;
         let blocks = width.div_ceil(across(device.info().lanes as usize)) * height.div_ceil(2);
@@ -220,11 +226,11 @@ impl Developer {
         let mut sums: Sums = of_film.iter().map(sums_of_block).sum();
         sums.block_count = (width / 2) * (height / 2);
         sums.clipped += of_picture.iter().map(|n| n[0] as u64).sum::<u64>();
-        sums.control = control.map(|c| apart(of_control, c.samples.pixels()));
+        sums.control = control.map(|c| sums_of_control(of_control, c.samples.pixels()));
         Ok(sums)
     }
 
-    /// The picture last developed: three bytes of sRGB a pixel, or four with an alpha that is not multiplied into them.
+    /// The picture last encoded: three bytes of sRGB a pixel, or four with an alpha that is not multiplied into them.
     ///
     /// # Errors
     /// [`crate::error::Error::Internal`] when OpenCL fails.
@@ -235,7 +241,7 @@ impl Developer {
     }
 }
 
-fn settings(main: Set<'_>, control: Option<Set<'_>>, look: &Look) -> Develop {
+fn settings(main: Set<'_>, control: Option<Set<'_>>, look: &EncodeSettings) -> Encode {
     let behind = match look.background {
         Background::Colour(behind) => behind,
         Background::Transparent => [0.0; 3],
@@ -244,7 +250,7 @@ fn settings(main: Set<'_>, control: Option<Set<'_>>, look: &Look) -> Develop {
     let main = main.samples;
     let tiles = main.tiles.as_ref().map_or([0; 2], |t| [int(t.side), int(t.wide)]);
     let control = control.map_or([0; 3], |c| [int(c.samples.width), int(c.samples.height), int(c.samples.stride)]);
-    Develop {
+    Encode {
         width: int(main.width),
         height: int(main.height),
         stride: int(main.stride),
@@ -263,7 +269,7 @@ fn settings(main: Set<'_>, control: Option<Set<'_>>, look: &Look) -> Develop {
     }
 }
 
-/// What an item of the film left, in the kernel's order.
+/// The sums of a block of the film.
 fn sums_of_block(numbers: &[f32; SUMS]) -> Sums {
     let of = |sum: FilmSum| f64::from(numbers[sum as usize]);
     let (scale, noise_scale) = (of(FilmSum::LuminanceScale), of(FilmSum::NoiseScale));
@@ -282,8 +288,8 @@ fn sums_of_block(numbers: &[f32; SUMS]) -> Sums {
     }
 }
 
-/// What the items of the control left.
-fn apart(rows: &[[f32; SUMS]], pixels: usize) -> Apart {
+/// The sums of the rows of the control.
+fn sums_of_control(rows: &[[f32; SUMS]], pixels: usize) -> Apart {
     let [mut squared, mut variance] = [0.0; 2];
     for row in rows {
         let of = |sum: ControlSum| f64::from(row[sum as usize]);

@@ -1,4 +1,4 @@
-//! How far around each voxel the medium is the same, so that a photon need not look again at every voxel.
+//! The clearance of a voxel: the distance within which all voxels have its label, so that a photon crosses them in one step.
 
 use rayon::prelude::*;
 
@@ -6,14 +6,14 @@ use rayon::prelude::*;
 /// Chebyshev distance to the nearest voxel that touches another label, by its face, edge or corner. Two sweeps, each from
 /// the neighbours that it has passed (Rosenfeld & Pfaltz, "Sequential Operations in Digital Picture Processing", J. ACM 13(4),
 /// 1966). x runs fastest in `labels` as in what is returned.
-pub fn reaches(labels: &[u16], dims: [usize; 3]) -> Vec<u8> {
-    let mut reach = vec![u8::MAX; labels.len()];
-    reach.par_chunks_mut(dims[0]).enumerate().for_each(|(row, out)| mark_borders(labels, dims, row, out));
+pub fn clearances(labels: &[u16], dims: [usize; 3]) -> Vec<u8> {
+    let mut clearance = vec![u8::MAX; labels.len()];
+    clearance.par_chunks_mut(dims[0]).enumerate().for_each(|(row, out)| mark_borders(labels, dims, row, out));
     let rows = dims[1] * dims[2];
     let mut nearest = vec![0; dims[0] + 2];
-    (0..rows).for_each(|row| sweep(&mut reach, dims, row, 1, &mut nearest));
-    (0..rows).rev().for_each(|row| sweep(&mut reach, dims, row, -1, &mut nearest));
-    reach
+    (0..rows).for_each(|row| sweep(&mut clearance, dims, row, 1, &mut nearest));
+    (0..rows).rev().for_each(|row| sweep(&mut clearance, dims, row, -1, &mut nearest));
+    clearance
 }
 
 /// The row of voxels that is dy and dz from a row, where the grid has one.
@@ -43,16 +43,16 @@ fn mark_borders(labels: &[u16], dims: [usize; 3], row: usize, out: &mut [u8]) {
 
 /// Brings a row's distances down to what its neighbours in the rows before it say (after it for `sense` -1), and those in it.
 /// `nearest` is for use meanwhile: one more than the row at each end.
-fn sweep(reach: &mut [u8], dims: [usize; 3], row: usize, sense: isize, nearest: &mut [u8]) {
+fn sweep(clearance: &mut [u8], dims: [usize; 3], row: usize, sense: isize, nearest: &mut [u8]) {
     let nx = dims[0];
     nearest.fill(u8::MAX);
     for beside in
         [[-1, 0], [-1, -1], [0, -1], [1, -1]].into_iter().filter_map(|d| row_beside(dims, row, d.map(|n| n * sense)))
     {
-        let other = &reach[beside * nx..][..nx];
+        let other = &clearance[beside * nx..][..nx];
         nearest[1..=nx].iter_mut().zip(other).for_each(|(n, r)| *n = (*n).min(*r));
     }
-    let line = &mut reach[row * nx..][..nx];
+    let line = &mut clearance[row * nx..][..nx];
     for (r, near) in line.iter_mut().zip(nearest.windows(3)) {
         *r = (*r).min(near[0].min(near[1]).min(near[2]).saturating_add(1));
     }
@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn reaches_are_what_looking_around_finds() {
+    fn clearances_are_what_looking_around_finds() {
         let dims = [13, 9, 11];
         let count = dims.iter().product::<usize>();
         let ball = |i: usize| {
@@ -97,17 +97,20 @@ mod tests {
             (0..count).map(stripes).collect(),
         ] {
             let wanted: Vec<u8> = (0..count).map(|i| by_looking(&labels, dims, i)).collect();
-            assert_eq!(reaches(&labels, dims), wanted);
+            assert_eq!(clearances(&labels, dims), wanted);
             assert!(wanted.iter().any(|r| *r > 0), "all of them border on another");
         }
     }
 
     #[test]
-    fn one_label_reaches_as_far_as_a_byte_can_say() {
-        assert_eq!(reaches(&[4; 300], [300, 1, 1]), [255; 300]);
+    fn the_clearance_of_one_label_is_as_far_as_a_byte_can_say() {
+        assert_eq!(clearances(&[4; 300], [300, 1, 1]), [255; 300]);
         let mut labels = [4; 600];
         labels[599] = 5;
-        let reach = reaches(&labels, [600, 1, 1]);
-        assert_eq!((reach[599], reach[598], reach[590], reach[344], reach[343], reach[0]), (0, 0, 8, 254, 255, 255));
+        let clearance = clearances(&labels, [600, 1, 1]);
+        assert_eq!(
+            (clearance[599], clearance[598], clearance[590], clearance[344], clearance[343], clearance[0]),
+            (0, 0, 8, 254, 255, 255)
+        );
     }
 }

@@ -1,13 +1,13 @@
-// Cells of one size along each axis, with walls between them at which a flight must look again, and how a free path that was drawn
-// with too large an extinction tells real collisions from null ones. TRACKING says how a free path is found:
-//   EXACT    walls are where the extinction changes (Amanatides & Woo, Eurographics 1987, for voxels): tau = sum sigma_i s_i
+// Cells of one size along each axis, crossed from boundary to boundary (DDA), and the classification of tentative collisions, which are
+// drawn with a majorant. TRACKING says how a free path is found:
+//   EXACT    cells are as large as the extinction is constant (Amanatides & Woo, Eurographics 1987, for voxels): tau = sum sigma_i s_i
 //   MARCH    steps of one length, each with the extinction at its start; a path ends with the step that uses it up
-//   DELTA    walls of coarse blocks, tentative collisions by the block's majorant m, real ones with probability sigma / m
+//   DELTA    cells are coarse blocks, tentative collisions by the block's majorant m, real ones with probability sigma / m
 //            (Woodcock et al., ANL-7050, 1965)
 //   WEIGHTED the same where m may be too small: real with probability P = sigma / (sigma + |m - sigma|), weight times
 //            sigma / (m P) or (m - sigma) / (m (1 - P)) (Galtier et al., JQSRT 125, 2013)
-#ifndef SHARED_WALLS_H
-#define SHARED_WALLS_H
+#ifndef SHARED_DDA_H
+#define SHARED_DDA_H
 
 #include "shared/lanes.h"
 
@@ -20,18 +20,18 @@ static inline Int cell_on_axis(Real p, float low, float cells_per_length, int ce
     return clamp(to_int(floor((p - low) * cells_per_length)), (Int)(0), (Int)(cells - 1));
 }
 
-// The wall ahead of a cell; the last cell may be cut short.
-static inline Real wall_on_axis(Int cell, Mask up, float low, float side, float high, int cells) {
+// The boundary ahead of a cell; the last cell may be cut short.
+static inline Real boundary_on_axis(Int cell, Mask up, float low, float side, float high, int cells) {
     Int next = select(cell, cell + 1, up);
     return select(mad(to_real(next), (Real)(side), (Real)(low)), (Real)(high), MASK(next >= cells));
 }
 
-static inline Real distance_to(Real wall, Real p, Real d) {
-    return select(fmax((wall - p) * reciprocal(d), (Real)(0.0f)), (Real)(1e30f), MASK(fabs(d) < 1e-12f));
+static inline Real distance_to(Real boundary, Real p, Real d) {
+    return select(fmax((boundary - p) * reciprocal(d), (Real)(0.0f)), (Real)(1e30f), MASK(fabs(d) < 1e-12f));
 }
 
 #if BY_MAJORANTS
-// Which of the tentative collisions `hit` are real, by the number u; a weight is times *factor.
+// Classifies the tentative collisions `hit` by the number u. Returns the real ones; weights are to be multiplied by *factor.
 static inline Mask real_collisions(Real sigma, Real rate, Real u, Mask hit, Real *factor) {
 #if TRACKING == TRACKING_DELTA
     *factor = (Real)(1.0f);

@@ -1,4 +1,4 @@
-// The film developed where it is: the picture in sRGB bytes, and sums that its error is made of. What is large stays on the device.
+// Encodes the film where it is: as the picture in sRGB bytes, and as sums that its error is made of. The film stays on the device.
 //
 // Items, in order: blocks of two rows of the film; rows of the control; where the film has fewer pixels than the picture (WHOLE 0), rows
 // of the picture, which is interpolated. Each of the first two leaves SUM_LENGTH numbers of its own, which the host adds up in double precision.
@@ -10,7 +10,7 @@
 // Pixels of a row that a work-item takes; a whole number of packets and of tiles.
 #define ACROSS (LANES == 1 ? 32 : 8 * LANES)
 
-// Makes `scale` the greatest yet; what the squares that are parts of the square of the one before are to be multiplied by.
+// Makes `scale` the greatest yet. Returns the factor of the squares so far, which are parts of the square of the scale before.
 static inline float rescale(float *scale, Real values) {
     if (!any_lane(MASK(values > *scale))) return 1.0f;
     float before = *scale;
@@ -52,33 +52,33 @@ static inline float of_blocks(Real upper, Real lower, int inside) {
 }
 #endif
 
-// The sum over every second pixel of a row of a block of the squared difference to the mean of its neighbours: what is lost of a picture that
-// is interpolated between every second one. `row` has the pixels of a packet; the last of one lane is kept in `last`, the one before first.
+// The sum over every second pixel of a row of a block of the squared difference to the mean of its neighbours: the loss of a picture that is
+// interpolated between every second one. `row` has the pixels of a packet; the last of one lane is kept in `last`, the one before first.
 static inline float of_between(Real row, float scale, int x, int inside, float *last, float *pixels) {
     float sum = 0.0f;
 #if LANES == 1
     if (!(x & 1)) {
-        float apart = scale * (last[1] - 0.5f * (last[0] + row));
-        if (x % ACROSS) sum = apart * apart, *pixels += 1.0f;
+        float deviation = scale * (last[1] - 0.5f * (last[0] + row));
+        if (x % ACROSS) sum = deviation * deviation, *pixels += 1.0f;
     }
     last[0] = last[1], last[1] = row;
 #else
     RealLanes lanes;
     lanes.v = row;
     for (int i = 1; i + 1 < min(LANES, inside); i += 2) {
-        float apart = scale * (lanes.lane[i] - 0.5f * (lanes.lane[i - 1] + lanes.lane[i + 1]));
-        sum += apart * apart, *pixels += 1.0f;
+        float deviation = scale * (lanes.lane[i] - 0.5f * (lanes.lane[i - 1] + lanes.lane[i + 1]));
+        sum += deviation * deviation, *pixels += 1.0f;
     }
 #endif
     return sum;
 }
 
-// What one sample of each of some pixels differs by: its variance, 0 where that is not known.
+// The variance of single samples of some pixels; 0 where it is not known.
 static inline Real variances(Real m2, Real count) {
     return select((Real)(0.0f), m2 / (count - 1.0f), MASK(count > 1.0f) & known(m2));
 }
 
-static inline void of_film(constant Develop *d, global const float *film, global const uint *counts, global const uchar *curve,
+static inline void of_film(constant Encode *d, global const float *film, global const uint *counts, global const uchar *curve,
                            global uchar *picture, int block, global float *sums) {
     int across = (d->width + ACROSS - 1) / ACROSS;
     int x0 = block % across * ACROSS, y0 = block / across * 2;
@@ -101,7 +101,7 @@ static inline void of_film(constant Develop *d, global const float *film, global
             int pixel = (y0 + row) * d->width + x;
             Real alpha;
             Real3 colour = load_pixels(film, pixel, &alpha);
-            // Beside the volume there is nothing to add up but what is not known.
+            // Beside the volume there is nothing to add up but unknown errors.
             Int lit = as_Int(colour.x) | as_Int(colour.y) | as_Int(colour.z) | as_Int(alpha);
             int is_empty = !any_lane(MASK(lit != 0) & lanes);
 #if WHOLE
@@ -151,8 +151,8 @@ static inline void of_film(constant Develop *d, global const float *film, global
     sums[SUM_WEIGHTED] = sum_lanes(weighted);
 }
 
-// A row of the control against the film's pixels at the same places.
-static inline void of_control(constant Develop *d, global const float *film, global const float *control, global const uint *counts,
+// A row of the control against the film's pixels at the same positions.
+static inline void of_control(constant Encode *d, global const float *film, global const float *control, global const uint *counts,
                               int y, global float *sums) {
     global const float *deviations = film + 4 * d->width * d->height;
     float scale = 0.0f;
@@ -165,10 +165,10 @@ static inline void of_control(constant Develop *d, global const float *film, glo
         Int column = select((Int)(0), (x + LANE_IDS) * d->control_stride, lanes);
         Int at = row * d->width + column;
         Real3 colour = real3(gather_reals(film, 4 * at), gather_reals(film, 4 * at + 1), gather_reals(film, 4 * at + 2));
-        Real apart = select((Real)(0.0f), fabs(luminances(colour) - l), lanes);
-        float ratio = rescale(&scale, apart);
+        Real distance = select((Real)(0.0f), fabs(luminances(colour) - l), lanes);
+        float ratio = rescale(&scale, distance);
         if (ratio != 1.0f) difference *= ratio;
-        Real part = apart * inverse(scale);
+        Real part = distance * inverse(scale);
         difference += part * part;
         if (!d->deviations) continue;
         Real samples = (Real)((float)d->count);
@@ -184,8 +184,8 @@ static inline void of_control(constant Develop *d, global const float *film, glo
 }
 
 #if !WHOLE
-// Where a pixel of the picture is among the film's `n`: between `low` and the one after, `part` of the way.
-static inline Int place(Int full, int stride, int n, Int *high, Real *part) {
+// The position of a pixel of the picture among the film's `n`: between the one that is returned and *high, *part of the way.
+static inline Int film_position(Int full, int stride, int n, Int *high, Real *part) {
     Real at = to_real(full) / (float)stride;
     at = at < (float)(n - 1) ? at : (Real)((float)(n - 1));
     Int low = min(to_int(at), (Int)(max(n - 2, 0)));
@@ -200,16 +200,16 @@ static inline Real between(Real a, Real b, Real part) {
     return a + more;
 }
 
-// A row of the picture from a film of fewer pixels; how many values were clipped.
-static inline int enlarge(constant Develop *d, global const float *film, global const uchar *curve, global uchar *picture, int y) {
+// A row of the picture from a film of fewer pixels. Returns the number of clipped values.
+static inline int enlarge(constant Encode *d, global const float *film, global const uchar *curve, global uchar *picture, int y) {
     int clipped = 0;
     Int y1;
     Real fy;
-    Int y0 = place((Int)(y), d->stride, d->height, &y1, &fy);
+    Int y0 = film_position((Int)(y), d->stride, d->height, &y1, &fy);
     for (int x = 0; x < d->picture_width; x += LANES) {
         Int x1;
         Real fx;
-        Int x0 = place(x + LANE_IDS, d->stride, d->width, &x1, &fx);
+        Int x0 = film_position(x + LANE_IDS, d->stride, d->width, &x1, &fx);
         Real out[4];
         for (int c = 0; c < 4; c++) {
             Real top = between(gather_reals(film, 4 * (y0 * d->width + x0) + c), gather_reals(film, 4 * (y0 * d->width + x1) + c), fx);
@@ -224,7 +224,7 @@ static inline int enlarge(constant Develop *d, global const float *film, global 
 }
 #endif
 
-kernel void develop(constant Develop *settings, global const float *film, global const float *control, global const uint *counts,
+kernel void encode(constant Encode *settings, global const float *film, global const float *control, global const uint *counts,
                     global const uchar *curve, global uchar *picture, global float *sums) {
     int item = (int)get_global_id(0);
     int blocks = (settings->width + ACROSS - 1) / ACROSS * ((settings->height + 1) / 2);
