@@ -22,8 +22,9 @@ typedef struct {
     Mask alive;
     Int steps; // that the photon has taken
     Draws draws;
-    Gains gains;
-    Grid grid;
+    // Sums are indexed in memory. They are variables of their own, so that the photons can stay in registers.
+    Gains *gains;
+    Grid *grid;
 } Work;
 
 // A step of all lanes: its end, and the medium where it began.
@@ -35,7 +36,7 @@ typedef struct {
     UInt4Lanes random;
 } Step;
 
-static inline Work no_work(constant const PhotonTransport *params, Grid grid) {
+static inline Work no_work(constant const PhotonTransport *params, Grid *grid, Gains *gains) {
     Work w;
     Photon *photon = &w.photon;
     photon->p = photon->d = real3(0.0f, 0.0f, 0.0f);
@@ -46,7 +47,7 @@ static inline Work no_work(constant const PhotonTransport *params, Grid grid) {
     w.alive = (Mask)(0);
     w.steps = (Int)(0);
     w.draws.number = w.draws.event = ~(UInt)(0u);
-    w.gains = no_gains();
+    w.gains = gains;
     w.grid = grid;
     return w;
 }
@@ -60,11 +61,11 @@ static inline void begin(constant const FieldPass *pass, constant const PhotonTr
     launch(pass, params, &launched);
     launched.event = (UInt)(1u), launched.weight = (Real)(1.0f), launched.optical = launched.path = (Real)(0.0f);
     launched.scatterings = (Int)(0), launched.energy = (Real)(params->source_kev);
-    enter(params, table, fresh, &launched, &w->gains, &missed);
-    gain_path(params, photon, fresh, &w->gains);
+    enter(params, table, fresh, &launched, w->gains, &missed);
+    gain_path(params, photon, fresh, w->gains);
     replace_photons(photon, &launched, fresh);
     if (any_lane(missed)) {
-        gain(&w->gains.sums[LEDGER_LOST], photon->weight, missed);
+        gain(&w->gains->sums[LEDGER_LOST], photon->weight, missed);
         tally_fixed(ledger, (Int)(LEDGER_MISSED), ulong_from((UInt)(1u)), missed);
     }
 #if HAS_CLEARANCE
@@ -113,9 +114,9 @@ static inline void score_track(constant const PhotonTransport *params, global co
 #if VOXEL_CELLS
     Real amount = photon->weight * t * params->deposit_scale;
     if (params->tally == TALLY_ABSORBED_TRACK) amount *= rate * (1.0f - medium_number(params, table, medium, MEDIUM_ALBEDO));
-    grid_add(&w->grid, cell_voxel(params, photon->cell), fixed(amount), w->alive);
+    grid_add(w->grid, cell_voxel(params, photon->cell), fixed(amount), w->alive);
 #else
-    deposit_track(params, table, &w->grid, photon->p, photon->d, t, photon->weight, w->alive);
+    deposit_track(params, table, w->grid, photon->p, photon->d, t, photon->weight, w->alive);
 #endif
 }
 
@@ -167,7 +168,7 @@ static inline void score_collision(constant const PhotonTransport *params, globa
         Real towards = phase_density(table, m, one_minus_cosine(photon->d, scale3(to, rsqrt(fmax(dot3(to, to), (Real)(1e-20f))))));
         amount = fixed(photon->weight * params->deposit_scale / sigma * towards);
     }
-    deposit(params, &w->grid, voxel, photon->p, amount, real);
+    deposit(params, w->grid, voxel, photon->p, amount, real);
 }
 
 // The weights that are left after the roulette, which faint ones play.
@@ -176,7 +177,7 @@ static inline Real roulette(constant const FieldPass *pass, constant const Photo
     if (!any_lane(faint)) return left;
     Mask survives = MASK(unit_open(draw(pass, &w->photon, 3).a) < params->roulette_survival);
     Real gained = select((Real)(0.0f), left / params->roulette_survival, survives);
-    gain(&w->gains.sums[LEDGER_LOST], left - gained, faint);
+    gain(&w->gains->sums[LEDGER_LOST], left - gained, faint);
     return select(left, gained, faint);
 }
 
@@ -225,8 +226,8 @@ static inline Mask scatter(constant const FieldPass *pass, constant const Photon
     ULong absorbed_fixed = fixed(select((Real)(0.0f), absorbed, real));
     if (params->tally != TALLY_FLUENCE_TRACK && params->tally != TALLY_ABSORBED_TRACK)
         score_collision(params, table, &m, sigma, absorbed_fixed, real, w);
-    w->gains.sums[LEDGER_ABSORBED] = add_ulong(w->gains.sums[LEDGER_ABSORBED], absorbed_fixed);
-    w->gains.scatterings += as_UInt(select((Int)(0), (Int)(1), real));
+    w->gains->sums[LEDGER_ABSORBED] = add_ulong(w->gains->sums[LEDGER_ABSORBED], absorbed_fixed);
+    w->gains->scatterings += as_UInt(select((Int)(0), (Int)(1), real));
     Real left = roulette(pass, params, photon->weight - absorbed, real, w);
     photon->weight = select(photon->weight, left, real);
     Mask goes_on = real & MASK(left != 0.0f);
@@ -246,8 +247,8 @@ static inline Mask scatter(constant const FieldPass *pass, constant const Photon
 static inline Mask arrive(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table, global ulong *ledger,
                           const Step *s, Work *w) {
     Mask gone = s->late;
-    if (any_lane(s->crosses)) gone |= cross(pass, params, table, ledger, &w->gains, &s->ahead, s->crosses, &w->photon);
-    if (any_lane(s->late)) gain(&w->gains.sums[LEDGER_GATED], w->photon.weight, s->late);
+    if (any_lane(s->crosses)) gone |= cross(pass, params, table, ledger, w->gains, &s->ahead, s->crosses, &w->photon);
+    if (any_lane(s->late)) gain(&w->gains->sums[LEDGER_GATED], w->photon.weight, s->late);
     return gone;
 }
 
@@ -255,7 +256,7 @@ static inline Mask arrive(constant const FieldPass *pass, constant const PhotonT
 static inline void take_out_faults(constant const PhotonTransport *params, global ulong *ledger, Work *w) {
     Mask finite = MASK(fabs(w->photon.weight) <= 1e30f), fault = w->alive & (MASK(w->steps > params->most_steps) | ~finite);
     if (!any_lane(fault)) return;
-    gain(&w->gains.sums[LEDGER_LOST], select((Real)(0.0f), w->photon.weight, finite), fault);
+    gain(&w->gains->sums[LEDGER_LOST], select((Real)(0.0f), w->photon.weight, finite), fault);
     tally_fixed(ledger, (Int)(LEDGER_FAULTS), ulong_from((UInt)(1u)), fault);
     w->alive &= ~fault;
 }
@@ -266,9 +267,10 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
     uint item = (uint)get_global_id(0) / pass->stride;
     if ((ulong)item * pass->per_item >= pass->count) return;
     int voxels = params->grid[0] * params->grid[1] * params->grid[2];
-    Grid own = grid_at(grid + (pass->own_grids ? (size_t)item * voxels : 0), pass->own_grids, voxels);
+    Grid sums = grid_at(grid + (pass->own_grids ? (size_t)item * voxels : 0), pass->own_grids, voxels);
+    Gains gains = no_gains();
     Queue queue = queue_of(pass, item);
-    Work w = no_work(params, own);
+    Work w = no_work(params, &sums, &gains);
     for (;;) {
         if (queue.next == queue.end && queue.more) take_share(pass, ledger, &queue);
         if (queue.next < queue.end && is_launch_due(count_lanes(~w.alive), &queue)) begin(pass, params, table, ledger, &queue, &w);
@@ -283,7 +285,7 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
         w.alive &= ~gone & (goes_on | ~step.hit);
         take_out_faults(params, ledger, &w);
     }
-    if (w.grid.own) grid_flush(&w.grid);
-    gain_path(params, &w.photon, (Mask)(-1), &w.gains);
-    gains_flush(ledger, &w.gains);
+    if (sums.own) grid_flush(&sums);
+    gain_path(params, &w.photon, (Mask)(-1), &gains);
+    gains_flush(ledger, &gains);
 }

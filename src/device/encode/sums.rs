@@ -1,0 +1,81 @@
+//! The sums that the kernel of [`super::Encoder`] leaves.
+
+use crate::device::enums::DeviceEnum;
+use crate::device_enum;
+use crate::film::{Apart, Sums};
+
+device_enum! {
+    /// Numbers that a work-item leaves of two rows of the film.
+    pub enum FilmSum: "SUM" {
+        /// Luminance.
+        Luminance,
+        /// The greatest luminance: squares are added up as parts of its square.
+        LuminanceScale,
+        /// Squares of what may be missing behind the ends of rays.
+        Truncated,
+        /// Squared deviations of blocks of four pixels from their means.
+        Blocks,
+        /// Squared differences of pixels to the mean of their neighbours.
+        Between,
+        /// How many such pixels.
+        PixelsBetween,
+        /// The greatest squared standard error.
+        NoiseScale,
+        /// Squared standard errors of pixels.
+        Noise,
+        /// Their squares.
+        NoiseSquares,
+        /// Pixels of unknown error.
+        Unknown,
+        /// Values above white.
+        Clipped,
+        /// Luminance times samples.
+        Weighted,
+    }
+}
+
+device_enum! {
+    /// Numbers that a work-item leaves of a row of the control, the first of as many as [`FilmSum`] has.
+    pub enum ControlSum: "CONTROL" {
+        /// The greatest difference to the film.
+        DifferenceScale,
+        /// Squared differences, as parts of its square.
+        Difference,
+        /// Variances of single samples.
+        Variance,
+    }
+}
+
+/// Numbers of a work-item.
+pub const SUMS: usize = FilmSum::LENGTH;
+
+/// The sums of a block of the film.
+pub fn sums_of_block(numbers: &[f32; SUMS]) -> Sums {
+    let of = |sum: FilmSum| f64::from(numbers[sum as usize]);
+    let (scale, noise_scale) = (of(FilmSum::LuminanceScale), of(FilmSum::NoiseScale));
+    Sums {
+        luminance: of(FilmSum::Luminance),
+        truncated: of(FilmSum::Truncated) * scale * scale,
+        blocks: of(FilmSum::Blocks) * scale * scale,
+        between: of(FilmSum::Between) * scale * scale,
+        pixels_between: of(FilmSum::PixelsBetween) as u64,
+        noise: of(FilmSum::Noise),
+        noise_squares: of(FilmSum::NoiseSquares) * noise_scale * noise_scale,
+        unknown: of(FilmSum::Unknown) as u64,
+        clipped: of(FilmSum::Clipped) as u64,
+        weighted: of(FilmSum::Weighted),
+        ..Sums::default()
+    }
+}
+
+/// The sums of the rows of the control.
+pub fn sums_of_control(rows: &[[f32; SUMS]], pixels: usize) -> Apart {
+    let [mut squared, mut variance] = [0.0; 2];
+    for row in rows {
+        let of = |sum: ControlSum| f64::from(row[sum as usize]);
+        let scale = of(ControlSum::DifferenceScale);
+        squared += of(ControlSum::Difference) * scale * scale;
+        variance += of(ControlSum::Variance);
+    }
+    Apart { squared, variance, pixels }
+}
