@@ -160,7 +160,7 @@ device_struct! {
         pub high_mm: [f32; 3],
         /// 1 if they go further than the grid.
         pub endless: i32,
-        /// A [`BoundaryKind`] per axis.
+        /// A `BoundaryKind` per axis.
         pub boundary: [i32; 3],
         /// Cells of the DDA along each axis.
         pub cells: [i32; 3],
@@ -204,7 +204,7 @@ device_struct! {
         pub gate_mm: f32,
         /// The march's step.
         pub march_step_mm: f32,
-        /// A [`SourceKind`].
+        /// A `SourceKind`.
         pub source_type: i32,
         /// Its position.
         pub source: [f32; 3],
@@ -220,7 +220,7 @@ device_struct! {
         pub roulette_threshold: f32,
         /// Probability to survive it.
         pub roulette_survival: f32,
-        /// The quantity in the grid: a [`Tally`].
+        /// The quantity in the grid: a `Tally`.
         pub tally: i32,
         /// Deposits of length are times this.
         pub deposit_scale: f32,

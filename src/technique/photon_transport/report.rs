@@ -7,7 +7,7 @@ use super::{FIXED_ONE, Simulation};
 use crate::device::enums::DeviceEnum;
 use crate::technique::majorant::march_bias;
 
-/// The ledger's fractions, in the order of [`LedgerEntry`]: the first ten add up to 1, the last two are parts of exits.
+/// The ledger's fractions, in the order of `LedgerEntry`: the first ten add up to 1, the last two are parts of exits.
 pub const FRACTIONS: [&str; 12] = [
     "exit_minus_x",
     "exit_plus_x",
