@@ -1,11 +1,11 @@
 //! Cloudchamber: a server that renders volumes and shows how accurate each picture is and what it cost.
 //!
 //! ```text
-//! HTTP body ─► request ─► scene ─► plan ─► job ─► device ─► film | field ─► frame ─► HTTP stream
+//! HTTP body ─► request ─► render ─► plan ─► job ─► device ─► film | field ─► frame ─► HTTP stream
 //!            (wire JSON) (valid)  (data)  (queue) (OpenCL)  (sums)         (PNG)
 //! ```
 //!
-//! The data goes one way. Who uses whom: `http` and the command line → `study` → `plan` → `job` → `scene` and `technique` → `device` → `film` →
+//! The data goes one way. Who uses whom: `http` and `command` → `study` → `service` → `plan` and `run` → `job` → `render` → `technique` → `scene` → `request` → `device` → `film` →
 //! `frame` → `volume` → `power_law` → `error`; never back (`tests/house.rs` sees to it). A job holds its scene and lets it be planned where it
 //! runs, since a field's plan changes while it fills.
 //!
@@ -14,12 +14,15 @@
 //! | [`config`] | flags and environment: address, folders, limits |
 //! | [`error`] | one error enum; the one place where a status code is chosen |
 //! | [`http`] | routes, content negotiation, problem details, streams, OpenAPI; no physics |
-//! | [`client`] | the command line's side of the HTTP contract |
+//! | [`command`] | the command line: a file a command, and its side of the HTTP contract |
 //! | [`request`] | wire types and the schemas they are checked against |
-//! | [`scene`] | the validated scene: camera, transfer function, medium, lights, budget |
+//! | [`render`] | the validated request: scene, subject, budget |
+//! | [`scene`] | its parts: camera, transfer function, medium, lights, window, clip |
 //! | [`technique`] | the list of techniques; one file each, which makes plans as data |
 //! | [`volume`] | grids: readers, built-ins, the store |
-//! | [`job`] | queue, fair slices on the device thread, kernels compiled beside it, cancellation, the latest frame |
+//! | [`run`] | the device thread: stages of a run, fair slices, passes, kernels compiled beside it |
+//! | [`job`] | the record of a render: queue, states, events, replies, the latest frame; the executor that works on it |
+//! | [`service`] | the service in one object: engine, volumes, limits, planner; one way to submit a render |
 //! | [`plan`] | the planner: the cheapest setting that is accurate enough, or the best in a time, with reasons |
 //! | [`study`] | speed against accuracy: cases with a truth, measured |
 //! | [`device`] | the only home of OpenCL and of `unsafe`: context, programs, buffers |
@@ -32,7 +35,7 @@
 //! `tests/{api,stream,faults,viewer,…}.rs`.
 
 pub mod chart;
-pub mod client;
+pub mod command;
 pub mod config;
 pub mod device;
 pub mod error;
@@ -42,8 +45,11 @@ pub mod http;
 pub mod job;
 pub mod plan;
 pub mod power_law;
+pub mod render;
 pub mod request;
+pub mod run;
 pub mod scene;
+pub mod service;
 pub mod study;
 pub mod technique;
 pub mod volume;

@@ -3,9 +3,13 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test says what is wrong by panicking")]
 
 mod common;
+#[path = "house/imports.rs"]
+mod imports;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+
+use imports::Imports;
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -50,41 +54,90 @@ fn opencl_and_unsafe_live_in_device_only() {
     assert!(!mentioning(&["opencl3"]).is_empty(), "the test looks for something that is there");
 }
 
-/// The way of the data: what stands to the left is not used by what stands to the right.
+/// The way of the data, the left first: a module uses only those behind it. Modules in brackets do not use each other.
+const ORDER: [&[&str]; 17] = [
+    &["command"],
+    &["http"],
+    &["study"],
+    &["service"],
+    &["plan", "run"],
+    &["chart"],
+    &["job"],
+    &["render"],
+    &["technique"],
+    &["scene"],
+    &["request"],
+    &["config"],
+    &["device"],
+    &["film"],
+    &["frame", "power_law"],
+    &["volume"],
+    &["error"],
+];
+
 #[test]
 fn layers_point_one_way() {
-    let order = [
-        "http",
-        "study",
-        "plan",
-        "job",
-        "scene",
-        "technique",
-        "device",
-        "film",
-        "frame",
-        "volume",
-        "power_law",
-        "error",
-    ];
-    let place = |module: &str| order.iter().position(|m| *m == module);
+    let imports = Imports::of(&root().join("src"));
+    let place = |module: &str| {
+        let found = ORDER.iter().position(|layer| layer.contains(&module));
+        found.unwrap_or_else(|| panic!("{module} has no place in the order"))
+    };
     let mut wrong = Vec::new();
-    for path in files(&root().join("src"), "rs") {
-        let file = path.strip_prefix(root().join("src")).unwrap().display().to_string();
-        let module = file.split(['/', '.']).next().unwrap().to_owned();
-        // A scene holds its techniques and a technique is told of cameras: these two are one layer.
-        let Some(own) = place(&module) else { continue };
-        for line in std::fs::read_to_string(&path).unwrap().lines().filter(|l| !l.trim_start().starts_with("//")) {
-            for (left, name) in order.iter().enumerate().take(own) {
-                let one_layer = module == "technique" && *name == "scene";
-                if left < own && !one_layer && line.contains(&format!("crate::{name}::")) {
-                    wrong.push(format!("{file} uses {name}: {line}"));
-                }
+    for (from, all) in &imports.uses {
+        for to in all.iter().filter(|to| to[0] != from[0]) {
+            if place(&to[0]) <= place(&from[0]) {
+                wrong.push(format!("{} uses {}", from.join("::"), to.join("::")));
             }
         }
     }
-    // The programs of the device know voxel types by name; structs of a view live beside the macro.
     assert!(wrong.is_empty(), "{wrong:#?}");
+    let count: usize = imports.uses.values().map(|all| all.len()).sum();
+    assert!(count > 500, "only {count} uses are seen");
+}
+
+#[test]
+fn no_modules_use_each_other_in_a_circle() {
+    let circles = Imports::of(&root().join("src")).circles();
+    assert!(circles.is_empty(), "{circles:#?}");
+}
+
+#[test]
+fn every_form_of_a_use_is_seen() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |file: &str, text: &str| {
+        let path = folder.path().join(file);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, text).unwrap();
+    };
+    write("whole.rs", "use crate::used;");
+    write("braces.rs", "use crate::{error::E, used::{self, inner::Deep as Other}};");
+    write("path.rs", "fn f() { let text = \"crate::error::E\"; println!(\"{}\", crate::used::f(text)); }");
+    write("parents.rs", "use super::used::f;");
+    write("handed_on.rs", "use crate::used::Handed;");
+    write("by_name.rs", "use crate::used;\nfn f() { used::inner::g() }");
+    write("tested.rs", "// use crate::used;\n#[cfg(test)]\nmod tests { use crate::used; }");
+    write("error.rs", "pub struct E;");
+    write("used/mod.rs", "mod inner;\npub use inner::Handed;\nfn f() { inner::g() }");
+    write("used/inner.rs", "use super::f;");
+    let imports = Imports::of(folder.path());
+    let uses = |module: &str| -> Vec<String> {
+        imports.uses[&vec![module.to_owned()]].iter().map(|to| to.join("::")).collect()
+    };
+    assert_eq!(uses("whole"), ["used"]);
+    assert_eq!(uses("braces"), ["error", "used", "used::inner"]);
+    assert_eq!(uses("path"), ["used"]);
+    assert_eq!(uses("parents"), ["used"]);
+    assert_eq!(uses("handed_on"), ["used::inner"]);
+    assert_eq!(uses("by_name"), ["used", "used::inner"]);
+    assert!(uses("tested").is_empty() && uses("error").is_empty());
+    assert!(imports.circles().is_empty(), "a folder and its own are no circle");
+    write("error.rs", "use crate::whole::F;");
+    write("used/other.rs", "use crate::error::E;\nuse super::inner;");
+    write("used/inner.rs", "use super::other;");
+    let circles = Imports::of(folder.path()).circles();
+    let all =
+        [vec!["error".to_owned(), "used".into(), "whole".into()], vec!["used::inner".into(), "used::other".into()]];
+    assert_eq!(circles, all);
 }
 
 #[test]

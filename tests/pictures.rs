@@ -11,7 +11,7 @@ mod common;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use cloudchamber::scene::{self, Scene, Subject};
+use cloudchamber::render::{self, Subject};
 use cloudchamber::technique;
 use common::engine::House;
 use common::pictures::{self, Asked};
@@ -157,11 +157,10 @@ fn all_techniques_voxel_types_and_features_are_in_the_list() {
     let mut met = BTreeSet::new();
     for asked in &list {
         let request = pictures::with_volumes(&asked.request, house);
-        let scene =
-            Scene::from_json(&request, &house.store, &house.limits).unwrap_or_else(|e| panic!("{}: {e}", asked.name));
+        let scene = house.scene(&request).unwrap_or_else(|e| panic!("{}: {e}", asked.name));
         let variant = match scene.subject() {
             Subject::Volume(volume) => scene.view().plan(volume).unwrap().variant,
-            Subject::Field(field) => field.plan().unwrap().variant,
+            Subject::Field(field, ..) => field.kernels().unwrap()[0],
         };
         met.extend(variant.voxel.map(|v| (variant.kernel, "voxel", format!("{v:?}"))));
         met.extend(variant.features.iter().map(|(name, value)| (variant.kernel, *name, value.to_string())));
@@ -218,7 +217,7 @@ fn used(request: &Value, at: &str, found: &mut BTreeSet<(String, String)>) {
 #[test]
 fn all_that_a_request_may_say_is_said_in_the_list() {
     let (mut may, mut says) = (BTreeSet::new(), BTreeSet::new());
-    permitted(scene::schema(&House::shared().limits), "", &mut may);
+    permitted(render::schema(House::shared().service.limits()), "", &mut may);
     let everything = pictures::everything();
     everything.iter().for_each(|(_, asked)| used(&asked.request, "", &mut says));
     assert!(may.len() > 200, "the schema was read: {may:?}");

@@ -7,7 +7,7 @@ mod common;
 
 use std::collections::BTreeSet;
 
-use cloudchamber::scene::{Scene, Subject};
+use cloudchamber::render::Subject;
 use cloudchamber::technique;
 use cloudchamber::volume::RawQuery;
 use common::engine::House;
@@ -26,7 +26,7 @@ fn volumes(house: &House, value: impl Fn(usize) -> u8) -> Vec<String> {
             spacing: None,
             endian: None,
         };
-        house.store.insert(bytes, name, query.parse().unwrap()).unwrap().1
+        house.store().insert(bytes, name, query.parse().unwrap()).unwrap().1
     };
     vec![
         of("u8", values.clone()),
@@ -101,10 +101,10 @@ fn fields(labels: &str) -> Vec<Value> {
 
 /// The mean luminance of a picture of a few pixels, after the label of the variant that it is made by is noted.
 fn look(house: &House, request: &Value, reached: &mut BTreeSet<String>) -> f64 {
-    let scene = Scene::from_json(request, &house.store, &house.limits).unwrap_or_else(|e| panic!("{request}: {e}"));
+    let scene = house.scene(request).unwrap_or_else(|e| panic!("{request}: {e}"));
     match scene.subject() {
         Subject::Volume(volume) => reached.insert(scene.view().plan(volume).unwrap().variant.label()),
-        Subject::Field(field) => reached.insert(field.plan().unwrap().variant.label()),
+        Subject::Field(field, _) => reached.insert(field.kernels().unwrap()[0].label()),
     };
     let (film, _) = house.film(request);
     let values = film.main.mean.chunks_exact(4).map(|p| f64::from(p[0] + p[1] + p[2])).collect::<Vec<_>>();

@@ -12,6 +12,7 @@ mod level;
 pub mod program;
 mod select;
 mod signature;
+mod slice_length;
 pub mod structs;
 
 use std::collections::HashMap;
@@ -25,11 +26,10 @@ use opencl3::memory::{Buffer as ClBuffer, CL_MEM_COPY_HOST_PTR, CL_MEM_READ_WRIT
 use opencl3::program::Program;
 use opencl3::types::{CL_BLOCKING, cl_uchar};
 
-/// Its former name, which `job` still says.
-pub use encode as develop;
 pub use launch::Range;
 pub use select::{DeviceInfo, NO_DEVICE, list, select};
 pub use signature::Parameter;
+pub use slice_length::SliceLength;
 
 use crate::error::{Error, Result};
 use launch::Built;

@@ -13,7 +13,7 @@ use super::App;
 use crate::device::NO_DEVICE;
 use crate::error::{Error, Result};
 use crate::job::Readiness;
-use crate::{scene, technique};
+use crate::{render, technique};
 
 /// The process's metrics: one recorder, however many servers are in it.
 ///
@@ -29,16 +29,16 @@ pub(super) fn recorder() -> Result<PrometheusHandle> {
 
 /// `GET /v1/techniques`.
 pub(super) async fn techniques(State(app): State<App>) -> Json<Value> {
-    let one = |t: &technique::Technique| json!({"name": t.name, "kind": t.kind_name(), "summary": t.summary, "schema": scene::parameters_schema(t, &app.limits), "example": (t.example)()});
+    let one = |t: &technique::Technique| json!({"name": t.name, "kind": t.kind_name(), "summary": t.summary, "schema": render::parameters_schema(t, app.service.limits()), "example": (t.example)()});
     Json(json!({"techniques": technique::ALL.iter().map(one).collect::<Vec<_>>()}))
 }
 
 /// `GET /v1/device`.
 pub(super) async fn device(State(app): State<App>) -> Result<Response> {
-    match app.engine.readiness() {
+    match app.service.engine().readiness() {
         Readiness::Ready(info) => {
             let mut all = serde_json::to_value(&*info).map_err(Error::internal)?;
-            all["kernels"] = json!(app.engine.kernels());
+            all["kernels"] = json!(app.service.engine().kernels());
             Ok(Json(all).into_response())
         }
         Readiness::Starting => Err(Error::Unavailable("the device is being opened".into())),
@@ -54,18 +54,18 @@ pub(super) async fn healthz() -> Json<Value> {
 /// `GET /readyz`: the first picture can be rendered, there is room in the queue, and the server is not draining. How far other kernels
 /// are, and what was given up, stands beside it.
 pub(super) async fn readyz(State(app): State<App>) -> Result<Json<Value>> {
-    if app.engine.is_draining() {
+    if app.service.engine().is_draining() {
         return Err(Error::Unavailable("the server is shutting down".into()));
     }
-    match app.engine.readiness() {
+    match app.service.engine().readiness() {
         Readiness::Starting => Err(Error::Unavailable("the first kernels are being built".into())),
         Readiness::Failed(cause) => {
             tracing::error!(%cause, "not ready");
             Err(Error::Unavailable(NO_DEVICE.into()))
         }
-        Readiness::Ready(_) if !app.engine.has_room() => Err(Error::Unavailable("the queue is full".into())),
+        Readiness::Ready(_) if !app.service.engine().has_room() => Err(Error::Unavailable("the queue is full".into())),
         Readiness::Ready(info) => {
-            Ok(Json(json!({"status": "ready", "kernels": app.engine.kernels(), "lanes": info.lanes,
+            Ok(Json(json!({"status": "ready", "kernels": app.service.engine().kernels(), "lanes": info.lanes,
             "level": info.level, "gave_up": info.gave_up})))
         }
     }
@@ -80,9 +80,10 @@ fn resident_bytes() -> Option<f64> {
 
 /// `GET /metrics`, in Prometheus' text format.
 pub(super) async fn metrics(State(app): State<App>) -> Response {
-    metrics::gauge!("cloudchamber_renders_unfinished").set(app.engine.unfinished() as f64);
-    metrics::gauge!("cloudchamber_streams_open").set((app.limits.max_streams - app.streams.available_permits()) as f64);
-    let (stored, resident) = app.store.sizes();
+    metrics::gauge!("cloudchamber_renders_unfinished").set(app.service.engine().unfinished() as f64);
+    metrics::gauge!("cloudchamber_streams_open")
+        .set((app.service.limits().max_streams - app.streams.available_permits()) as f64);
+    let (stored, resident) = app.service.store().sizes();
     metrics::gauge!("cloudchamber_volumes_stored_bytes").set(stored as f64);
     metrics::gauge!("cloudchamber_volumes_resident_bytes").set(resident as f64);
     if let Some(bytes) = resident_bytes() {

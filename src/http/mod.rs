@@ -1,7 +1,9 @@
 //! The HTTP side: routes, negotiation, problem documents, streams. No physics, and the only home of axum.
 
 mod accept;
+mod frames;
 mod guard;
+mod idempotency;
 mod info;
 mod openapi;
 mod plans;
@@ -13,38 +15,35 @@ mod studies;
 mod viewer;
 mod volumes;
 
-use std::collections::HashMap;
 use std::future::Future;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use axum::body::Body;
+use axum::http::Request;
+use serde_json::Value;
 use tokio::net::TcpListener;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio_util::sync::CancellationToken;
 
-use crate::config::{Config, Limits};
+use crate::config::Config;
 use crate::error::{Error, Result};
-use crate::job::Engine;
-use crate::plan::Calibrations;
+use crate::job::{Engine, Job};
+use crate::service::Service;
 use crate::study::shelf::Shelf;
-use crate::volume::Store;
+use idempotency::Idempotency;
 
 /// Uploads at the same time: each may be as large as the limit of a body.
 const UPLOADS: usize = 4;
-/// Idempotency keys that are remembered.
-const IDEMPOTENCY_KEYS: usize = 4096;
 /// After draining, connections that still will not end get this long.
 const LAST_WORDS: Duration = Duration::from_secs(3);
 
 /// What every handler shares.
 #[derive(Clone)]
 pub(crate) struct App {
-    engine: Engine,
-    store: Arc<Store>,
+    service: Service,
     studies: Arc<Shelf>,
-    calibrations: Arc<Calibrations>,
-    limits: Arc<Limits>,
     request_timeout: Duration,
     streams: Arc<Semaphore>,
     /// Uploads that are held in memory at the same time; the others wait unread.
@@ -56,40 +55,37 @@ pub(crate) struct App {
     metrics: metrics_exporter_prometheus::PrometheusHandle,
 }
 
-/// Idempotency keys with the hash of their body and the render that they made, and the order in which they came.
-#[derive(Default)]
-struct Idempotency {
-    by_key: HashMap<String, (blake3::Hash, String)>,
-    order: std::collections::VecDeque<String>,
-}
-
-impl Idempotency {
-    fn remember(&mut self, key: String, body: blake3::Hash, id: String) {
-        if self.order.len() >= IDEMPOTENCY_KEYS
-            && let Some(oldest) = self.order.pop_front()
-        {
-            self.by_key.remove(&oldest);
-        }
-        self.order.push_back(key.clone());
-        self.by_key.insert(key, (body, id));
-    }
-}
-
 impl App {
+    /// The render of an id.
+    fn render(&self, id: &str) -> Result<Arc<Job>> {
+        let missing = || Error::NotFound { what: "render", id: id.chars().take(64).collect() };
+        self.service.engine().job(id).ok_or_else(missing)
+    }
+
+    /// The idempotency keys.
+    fn idempotency(&self) -> MutexGuard<'_, Idempotency> {
+        self.idempotency.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The JSON of a body.
+    async fn read_json(&self, request: Request<Body>) -> Result<Value> {
+        problem::read_json(request, self.service.limits().max_json_bytes, self.request_timeout).await
+    }
+
     /// A place for a stream or a waiting request.
     fn stream_permit(&self) -> Result<OwnedSemaphorePermit> {
-        let open = self.limits.max_streams;
+        let open = self.service.limits().max_streams;
         self.streams.clone().try_acquire_owned().map_err(|_| Error::StreamsFull { open, retry_after_s: 1 })
     }
 }
 
 /// Measures the device for the planner; a plan that comes meanwhile waits for it.
-async fn calibrate(app: App) {
-    if app.engine.ready().await.is_err() {
+async fn calibrate(service: Service) {
+    if service.engine().ready().await.is_err() {
         return;
     }
-    app.engine.compiled().await;
-    if let Err(error) = plans::planner(&app).calibrate().await {
+    service.engine().compiled().await;
+    if let Err(error) = service.planner().calibrate().await {
         tracing::warn!(%error, "the device is not calibrated");
     }
 }
@@ -98,26 +94,23 @@ async fn calibrate(app: App) {
 pub struct Server {
     listener: TcpListener,
     router: axum::Router,
-    engine: Engine,
+    service: Service,
     stop: CancellationToken,
     drain: Duration,
 }
 
 impl Server {
-    /// Opens the store, starts the engine and binds the address. The device warms up meanwhile; `/readyz` says when.
+    /// Starts the service and binds the address. The device warms up meanwhile; `/readyz` says when.
     ///
     /// # Errors
     /// [`Error::Internal`] with the cause in words.
     pub async fn bind(config: &Config) -> Result<Self> {
-        let store = Store::open(&config.device.data_dir().join("volumes"), config.limits.store())?;
-        let engine = Engine::start(config.device.device_config(), config.limits.clone())?;
+        let data_dir = config.device.data_dir();
+        let service = Service::start(config.device.device_config(), &data_dir, config.limits.clone())?;
         let stop = CancellationToken::new();
         let app = App {
-            engine: engine.clone(),
-            store: Arc::new(store),
-            calibrations: Arc::new(Calibrations::kept_in(&config.device.data_dir())),
-            studies: Arc::new(Shelf::new(config.device.data_dir().join("studies"))),
-            limits: Arc::new(config.limits.clone()),
+            service: service.clone(),
+            studies: Arc::new(Shelf::new(data_dir.join("studies"))),
             request_timeout: Duration::from_millis(config.request_timeout_ms),
             streams: Arc::new(Semaphore::new(config.limits.max_streams)),
             uploads: Arc::new(Semaphore::new(UPLOADS)),
@@ -127,13 +120,13 @@ impl Server {
             metrics: info::recorder()?,
         };
         if config.calibrate {
-            tokio::spawn(calibrate(app.clone()));
+            tokio::spawn(calibrate(service.clone()));
         }
         let router = routes::router(app, guard::Tokens::read(config)?, &config.cors_origin)?;
         let listener = TcpListener::bind(config.listen)
             .await
             .map_err(|e| Error::internal(format!("cannot listen on {}: {e}", config.listen)))?;
-        Ok(Self { listener, router, engine, stop, drain: config.drain() })
+        Ok(Self { listener, router, service, stop, drain: config.drain() })
     }
 
     /// The address that it listens on.
@@ -146,7 +139,7 @@ impl Server {
 
     /// The engine behind it.
     pub fn engine(&self) -> &Engine {
-        &self.engine
+        self.service.engine()
     }
 
     /// Serves until `signal` comes, then drains: new work is refused, running renders get their time, streams end.
@@ -154,7 +147,7 @@ impl Server {
     /// # Errors
     /// [`Error::Internal`] when the listener fails.
     pub async fn run(self, signal: impl Future<Output = ()> + Send + 'static) -> Result<()> {
-        let (engine, stop, drain) = (self.engine.clone(), self.stop.clone(), self.drain);
+        let (engine, stop, drain) = (self.service.engine().clone(), self.stop.clone(), self.drain);
         let drained = CancellationToken::new();
         let shutdown = {
             let drained = drained.clone();

@@ -10,8 +10,8 @@ use serde_json::{Map, Value, json};
 
 use super::App;
 use crate::error::{Error, Result};
+use crate::render;
 use crate::request::{CameraRequest, schema_of};
-use crate::scene;
 use crate::volume::VolumeInfo;
 
 /// One operation: method, path, words, body, the answers that are not problems, and the problems.
@@ -242,7 +242,7 @@ pub(super) async fn document(State(app): State<App>) -> Json<Value> {
         "paths": paths,
         "components": {
             "schemas": {
-                "RenderRequest": scene::schema(&app.limits), "Camera": schema_of::<CameraRequest>(),
+                "RenderRequest": render::schema(app.service.limits()), "Camera": schema_of::<CameraRequest>(),
                 "Volume": schema_of::<VolumeInfo>(), "Problem": problem,
             },
             "responses": {"Problem": {

@@ -13,7 +13,7 @@ use tower_http::cors::{AllowOrigin, Any, CorsLayer};
 use tower_http::trace::TraceLayer;
 
 use super::guard::{self, Tokens};
-use super::{App, info, openapi, plans, problem, renders, streams, studies, viewer, volumes};
+use super::{App, frames, info, openapi, plans, problem, renders, streams, studies, viewer, volumes};
 use crate::error::{Error, Result};
 
 /// Every route with its layers.
@@ -23,8 +23,8 @@ pub(super) fn router(app: App, tokens: Tokens, origins: &[String]) -> Result<Rou
         .route("/v1/renders/{id}", get(renders::show).delete(renders::cancel))
         .route("/v1/renders/{id}/camera", put(renders::set_camera))
         .route("/v1/renders/{id}/frames", get(streams::frames))
-        .route("/v1/renders/{id}/frame.png", get(renders::frame_png))
-        .route("/v1/renders/{id}/frame.exr", get(renders::frame_exr))
+        .route("/v1/renders/{id}/frame.png", get(frames::frame_png))
+        .route("/v1/renders/{id}/frame.exr", get(frames::frame_exr))
         .route("/v1/renders/{id}/difference", get(renders::difference))
         .route("/v1/renders/{id}/field", get(renders::field))
         .route("/v1/renders/{id}/events", get(streams::events))

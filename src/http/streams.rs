@@ -16,10 +16,11 @@ use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 
 use super::App;
+use super::frames::frame_headers;
 use super::problem::Id;
-use super::renders::{CancelOnDrop, find, frame_headers};
+
 use crate::error::Result;
-use crate::job::{Frame, Job, State as JobState, Update};
+use crate::job::{CancelOnDrop, Frame, Job, State as JobState, Update};
 
 /// A reader of a job's updates that knows what it has shown.
 struct Reader {
@@ -87,7 +88,7 @@ fn multipart(reader: Reader) -> impl Stream<Item = std::result::Result<Bytes, In
 
 /// The frames of a job as a response; a render that `fresh`ly belongs to this request ends with it.
 pub(super) fn frames_of(app: &App, job: Arc<Job>, fresh: bool) -> Result<Response> {
-    let guard = fresh.then(|| CancelOnDrop::new(app, &job, true));
+    let guard = fresh.then(|| CancelOnDrop::new(app.service.engine(), job.clone()));
     let reader = Reader::new(app, job, 0, guard)?;
     let headers =
         [(header::CONTENT_TYPE, "multipart/x-mixed-replace; boundary=frame"), (header::CACHE_CONTROL, "no-store")];
@@ -96,7 +97,7 @@ pub(super) fn frames_of(app: &App, job: Arc<Job>, fresh: bool) -> Result<Respons
 
 /// `GET /v1/renders/{id}/frames`.
 pub(super) async fn frames(State(app): State<App>, Id(id): Id) -> Result<Response> {
-    frames_of(&app, find(&app, &id)?, false)
+    frames_of(&app, app.render(&id)?, false)
 }
 
 fn event(job: &Job, update: &Update) -> Event {
@@ -124,7 +125,7 @@ fn event(job: &Job, update: &Update) -> Event {
 
 /// `GET /v1/renders/{id}/events`; `Last-Event-ID` says what was seen before.
 pub(super) async fn events(State(app): State<App>, Id(id): Id, headers: HeaderMap) -> Result<Response> {
-    let job = find(&app, &id)?;
+    let job = app.render(&id)?;
     let seen = headers.get("last-event-id").and_then(|v| v.to_str().ok()?.parse().ok()).unwrap_or(0);
     let reader = Reader::new(&app, job, seen, None)?;
     let events = stream::unfold(reader, |mut reader| async move {

@@ -28,10 +28,12 @@ pub(super) async fn create(State(app): State<App>, request: Request<Body>) -> Re
     let name: String =
         percent_decode_str(name).decode_utf8_lossy().chars().filter(|c| !c.is_control()).take(200).collect();
     let _turn = app.uploads.acquire().await.map_err(Error::internal)?;
-    let bytes = problem::read_body(&parts.headers, body, app.limits.max_body_bytes, app.request_timeout).await?;
-    let store = app.store.clone();
-    let (volume, id, new) =
-        tokio::task::spawn_blocking(move || store.insert(bytes, &name, raw)).await.map_err(Error::internal)??;
+    let bytes =
+        problem::read_body(&parts.headers, body, app.service.limits().max_body_bytes, app.request_timeout).await?;
+    let service = app.service.clone();
+    let (volume, id, new) = tokio::task::spawn_blocking(move || service.store().insert(bytes, &name, raw))
+        .await
+        .map_err(Error::internal)??;
     let location = format!("/v1/volumes/{id}");
     let status = if new { StatusCode::CREATED } else { StatusCode::OK };
     Ok((status, [(header::LOCATION, location)], Json(VolumeInfo::of_upload(&id, &volume))).into_response())
@@ -51,7 +53,7 @@ fn refuse_forms(headers: &axum::http::HeaderMap) -> Result<()> {
 
 /// `GET /v1/volumes`.
 pub(super) async fn list(State(app): State<App>) -> Result<Json<Value>> {
-    let volumes = tokio::task::spawn_blocking(move || app.store.list()).await.map_err(Error::internal)?;
+    let volumes = tokio::task::spawn_blocking(move || app.service.store().list()).await.map_err(Error::internal)?;
     Ok(Json(json!({"volumes": volumes})))
 }
 
@@ -59,9 +61,9 @@ pub(super) async fn list(State(app): State<App>) -> Result<Json<Value>> {
 pub(super) async fn show(State(app): State<App>, Id(id): Id) -> Result<Json<VolumeInfo>> {
     let info = tokio::task::spawn_blocking(move || {
         if builtin::NAMES.contains(&id.as_str()) {
-            app.store.builtin_info(&id, SHOWN_RESOLUTION, 0)
+            app.service.store().builtin_info(&id, SHOWN_RESOLUTION, 0)
         } else {
-            app.store.info(&id)
+            app.service.store().info(&id)
         }
     });
     Ok(Json(info.await.map_err(Error::internal)??))
@@ -72,6 +74,6 @@ pub(super) async fn delete(State(app): State<App>, Id(id): Id) -> Result<StatusC
     if builtin::NAMES.contains(&id.as_str()) {
         return Err(Error::Conflict("a built-in volume cannot be deleted".into()));
     }
-    tokio::task::spawn_blocking(move || app.store.delete(&id)).await.map_err(Error::internal)??;
+    tokio::task::spawn_blocking(move || app.service.store().delete(&id)).await.map_err(Error::internal)??;
     Ok(StatusCode::NO_CONTENT)
 }

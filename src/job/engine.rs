@@ -1,51 +1,29 @@
-//! The engine: admits jobs, keeps them readable, and starts the device thread (`device_thread.rs`).
+//! The engine: admits jobs, keeps them readable, and hands them to its executor.
 
 use std::collections::{HashMap, VecDeque};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc::{Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use serde_json::Value;
-use tokio::sync::{oneshot, watch};
+use tokio::sync::oneshot;
 
-use super::device_thread::{Command, DeviceThread};
-use super::kernels::{KernelProgress, Kernels};
-use super::{Job, State, develop};
+use super::executor::{Executor, KernelProgress, Readiness};
+use super::{Job, State, encode};
 use crate::config::Limits;
-use crate::device::{DeviceConfig, DeviceInfo, NO_DEVICE};
+use crate::device::{DeviceInfo, NO_DEVICE};
 use crate::error::{Error, Result};
 use crate::film::Film;
-use crate::scene::Scene;
+use crate::render::Scene;
 use crate::scene::camera::Camera;
 
-/// Whether the device is ready to work.
-#[derive(Debug, Clone)]
-pub enum Readiness {
-    /// The device is opened, and the first kernels are built.
-    Starting,
-    /// The first picture can be rendered; other kernels may still be compiled, which [`Engine::kernels`] tells.
-    Ready(Arc<DeviceInfo>),
-    /// The device could not be opened, or builds no kernel.
-    Failed(String),
-}
-
 struct Inner {
-    commands: Sender<Command>,
-    kernels: Kernels,
+    executor: Box<dyn Executor>,
     limits: Limits,
-    readiness: watch::Receiver<Readiness>,
     draining: AtomicBool,
     unfinished: AtomicUsize,
     jobs: Mutex<Jobs>,
     runtime: tokio::runtime::Handle,
-}
-
-impl Drop for Inner {
-    fn drop(&mut self) {
-        // A device thread that has ended by itself needs no telling.
-        drop(self.commands.send(Command::Stop));
-    }
 }
 
 #[derive(Default)]
@@ -76,52 +54,32 @@ pub struct Engine {
 }
 
 impl Engine {
-    /// Starts the device thread. Must be called within a tokio runtime, on which frames are then developed.
-    ///
-    /// # Errors
-    /// [`Error::Internal`] when no thread can be started.
-    pub fn start(config: DeviceConfig, limits: Limits) -> Result<Self> {
-        let (commands, incoming) = channel();
-        let (readiness, ready) = watch::channel(Readiness::Starting);
-        let live = limits.live_renders.max(1);
-        let kernels = Kernels::default();
-        let thread = DeviceThread {
-            config,
-            kernels: kernels.clone(),
-            commands: commands.clone(),
-            most_live: live,
-            keep_film_bytes: limits.keep_film_bytes,
-        };
-        std::thread::Builder::new()
-            .name("device".into())
-            .spawn(move || thread.run(&incoming, &readiness))
-            .map_err(Error::internal)?;
+    /// An engine that has `executor` work on its jobs. Must be called within a tokio runtime, on which frames are then encoded.
+    pub fn new(executor: impl Executor + 'static, limits: Limits) -> Self {
         let inner = Inner {
-            commands,
-            kernels,
+            executor: Box::new(executor),
             limits,
-            readiness: ready,
             draining: AtomicBool::new(false),
             unfinished: AtomicUsize::new(0),
             jobs: Mutex::default(),
             runtime: tokio::runtime::Handle::current(),
         };
-        Ok(Self { inner: Arc::new(inner) })
+        Self { inner: Arc::new(inner) }
     }
 
     /// Whether the device is ready.
     pub fn readiness(&self) -> Readiness {
-        self.inner.readiness.borrow().clone()
+        self.inner.executor.readiness().borrow().clone()
     }
 
     /// How far the kernels are.
     pub fn kernels(&self) -> KernelProgress {
-        self.inner.kernels.progress()
+        self.inner.executor.kernels()
     }
 
     /// Waits until nothing is left to compile: before that, times are not those of the device alone.
     pub async fn compiled(&self) {
-        while !self.inner.kernels.are_all_known() {
+        while !self.kernels().is_over() {
             tokio::time::sleep(Duration::from_millis(100)).await;
         }
     }
@@ -131,7 +89,7 @@ impl Engine {
     /// # Errors
     /// [`Error::Internal`] when it failed to become so.
     pub async fn ready(&self) -> Result<Arc<DeviceInfo>> {
-        let mut readiness = self.inner.readiness.clone();
+        let mut readiness = self.inner.executor.readiness();
         loop {
             match &*readiness.borrow_and_update() {
                 Readiness::Ready(info) => return Ok(info.clone()),
@@ -179,34 +137,24 @@ impl Engine {
         Ok(Place { engine: self.clone(), taken: false })
     }
 
-    /// Queues a render. `request` is kept to be shown again.
-    pub fn submit(&self, place: Place, request: Value, scene: Scene) -> Arc<Job> {
-        self.submit_planned(place, request, scene, None)
-    }
-
-    /// The same with what the planner said of it.
-    pub fn submit_planned(&self, mut place: Place, request: Value, scene: Scene, planned: Option<Value>) -> Arc<Job> {
+    /// Queues a render. `request` is kept to be shown again, and so is what the planner said of it.
+    pub fn submit(&self, mut place: Place, request: Value, scene: Scene, planned: Option<Value>) -> Arc<Job> {
         place.taken = true;
         self.start_job(Job::new(request, scene, planned, false))
     }
 
     /// Queues a render that nobody sees but the caller: it is not listed, and forgotten when it ends. It takes no place of its own: the
     /// plan that it is for holds one.
-    pub fn submit_pilot(&self, request: Value, scene: Scene) -> Arc<Job> {
-        self.start_job(Job::new(request, scene, None, true))
+    pub fn submit_pilot(&self, scene: Scene) -> Arc<Job> {
+        self.start_job(Job::new(Value::Null, scene, None, true))
     }
 
     fn start_job(&self, job: Arc<Job>) -> Arc<Job> {
         self.jobs().by_id.insert(job.id().to_owned(), job.clone());
-        self.inner.runtime.spawn(develop::frames(Arc::downgrade(&job), self.clone()));
-        self.run(&job);
+        let engine = self.clone();
+        self.inner.runtime.spawn(encode::frames(Arc::downgrade(&job), move |job| engine.ended(job)));
+        self.inner.executor.take(&job);
         job
-    }
-
-    fn run(&self, job: &Arc<Job>) {
-        if self.inner.commands.send(Command::Run(job.clone())).is_err() {
-            job.fail(&Error::internal("the device thread ended"));
-        }
     }
 
     /// Gives a render a new camera; a finished one goes through the queue again.
@@ -235,7 +183,7 @@ impl Engine {
             self.jobs().ended.retain(|id| id != job.id());
         }
         if restart.again {
-            self.run(job);
+            self.inner.executor.take(job);
         }
         Ok(())
     }
@@ -257,7 +205,7 @@ impl Engine {
     pub async fn film(&self, job: &Arc<Job>) -> Result<Arc<Film>> {
         let gone = || Error::NotFound { what: "film any more of render", id: job.id().into() };
         let (to, film) = oneshot::channel();
-        self.inner.commands.send(Command::Film(job.clone(), to)).map_err(|_| gone())?;
+        self.inner.executor.send_film(job, to);
         film.await.map_err(|_| gone())?.map(Arc::new)
     }
 
@@ -269,7 +217,7 @@ impl Engine {
     }
 
     /// Notes that a job ended, and forgets the oldest ended ones past the limits of what is kept.
-    pub(super) fn ended(&self, job: &Arc<Job>) {
+    fn ended(&self, job: &Arc<Job>) {
         if job.is_pilot() {
             self.jobs().by_id.remove(job.id());
             return;

@@ -3,12 +3,9 @@
 use std::sync::Arc;
 
 use serde::Serialize;
-use serde_json::{Value, json};
 
 use crate::film::{ErrorEstimate, Lowered};
 use crate::power_law::PowerLaw;
-use crate::scene::Scene;
-use crate::volume::Volume;
 
 /// Where a render stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -123,27 +120,6 @@ pub(super) fn slope(trace: &[TracePoint]) -> Option<f64> {
         .map(|p| (f64::from(p.samples), p.error))
         .collect();
     PowerLaw::through(&points).map(|l| l.power)
-}
-
-/// What a reader should know of the volume, in codes and words.
-pub(super) fn warnings(volume: &Volume, scene: &Scene) -> Vec<Value> {
-    let mut warnings: Vec<Value> =
-        volume.notes().iter().map(|n| json!({"code": "volume_note", "message": n})).collect();
-    if volume.non_finite() > 0 {
-        let message = format!(
-            "{} voxels are not finite; they and the cells they touch are rendered as empty",
-            volume.non_finite()
-        );
-        warnings.push(
-            json!({"code": "non_finite_voxels", "message": message, "measured": volume.non_finite(), "bound": 0}),
-        );
-    }
-    if scene.clip().removes_all(volume) {
-        let message = "the clipping planes leave nothing of the volume";
-        warnings.push(json!({"code": "clipped_away", "message": message}));
-    }
-    warnings.extend(scene.view().warnings(volume));
-    warnings
 }
 
 #[cfg(test)]

@@ -5,15 +5,14 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
-use serde_json::json;
+use serde_json::{Value, json};
 use tokio::sync::OnceCell;
 
 use super::{Planner, run};
 use crate::error::Result;
-use crate::scene::region::Region;
+use crate::render::region::Region;
+use crate::technique::{self, Kind};
 
-/// Techniques that are calibrated: one a family.
-const TECHNIQUES: [&str; 4] = ["emission_absorption", "isosurface", "single_scatter", "volume_path"];
 /// Side of the picture, how far apart the pixels of its pilot are, and samples of both.
 const LARGE: u32 = 256;
 const APART: u32 = 4;
@@ -43,7 +42,7 @@ impl Calibration {
     fn of(&self, technique: &str) -> Factors {
         let known = |name: &str| self.factors.get(name).copied();
         known(technique)
-            .or_else(|| known("emission_absorption"))
+            .or_else(|| known(technique::ALL[0].name))
             .unwrap_or(Factors { large_over_pilot: 1.0, besides: 0.0 })
     }
 
@@ -89,8 +88,10 @@ impl Calibrations {
         }
         let started = std::time::Instant::now();
         let mut factors = BTreeMap::new();
-        for technique in TECHNIQUES {
-            factors.insert(technique.to_owned(), measure(planner, technique).await?);
+        for technique in technique::views() {
+            if let Kind::View { calibration: Some(scene), .. } = technique.kind {
+                factors.insert(technique.name.to_owned(), measure(planner, technique.name, scene()).await?);
+            }
         }
         tracing::info!(ms = started.elapsed().as_millis() as u64, "the device is calibrated");
         let found = Calibration { of, factors };
@@ -104,14 +105,16 @@ impl Calibrations {
     }
 }
 
-/// The factors of a technique, on the built-in smoke.
-async fn measure(planner: &Planner<'_>, technique: &str) -> Result<Factors> {
+/// The factors of a technique, on the scene of its own choice.
+async fn measure(planner: &Planner<'_>, technique: &str, mut request: Value) -> Result<Factors> {
+    request["technique"] = json!(technique);
+    request["image"] = json!({"width": LARGE, "height": LARGE});
+    let scene = planner.scene(&request)?;
     let time = async |apart: u32| -> Result<[f64; 2]> {
         let mut least = [f64::INFINITY; 2];
         for seed in 0..4 {
-            let request = json!({"technique": technique, "volume": {"builtin": "smoke", "resolution": 64}, "seed": seed,
-                "image": {"width": LARGE, "height": LARGE}, "budget": {"samples": SAMPLES}});
-            let run = run::finish(planner, request, Region::every(apart, [LARGE, LARGE]), None).await?;
+            let pilot = scene.clone().with_seed(seed).into_pilot(Region::every(apart, [LARGE, LARGE]), SAMPLES);
+            let run = run::finish(planner, pilot).await?;
             least = [least[0].min(run.ms[0]), least[1].min(run.ms[1] / run.pixels as f64)];
         }
         Ok(least)

@@ -1,10 +1,11 @@
 //! The cheapest candidate that is enough, or the best that is in time.
 
 use super::calibration::Calibration;
+use super::field_work::FieldWork;
 use super::noise::{Places, SMALL};
-use super::photons::Photons;
 use super::pilot::Pilot;
-use super::{Considered, Predicted, Wish};
+use super::reply::{Considered, FieldAmount, Predicted};
+use super::target::Target;
 
 /// What a plan aims at, of the error asked for: besides what chance does, estimates are off by a percent.
 pub(super) const AIM: f64 = 0.99;
@@ -38,8 +39,8 @@ pub struct Chosen {
 pub struct Amount {
     /// Samples per pixel.
     pub samples: u32,
-    /// Photons, where a field is to be computed first.
-    pub photons: Option<u64>,
+    /// Work of a field, where one is to be computed first.
+    pub work: Option<FieldAmount>,
 }
 
 /// What is chosen from, and for what.
@@ -49,22 +50,22 @@ pub struct Choice<'a> {
     /// What the places in a pixel miss.
     pub places: &'a Places,
     /// What is asked for.
-    pub wish: Wish,
+    pub target: Target,
     /// The picture's sides.
     pub image: [u32; 2],
     /// What is known of the device.
     pub calibration: &'a Calibration,
     /// The most samples that are permitted.
     pub most: u32,
-    /// The photons of a field that is looked at.
-    pub photons: Option<&'a Photons>,
+    /// The work of a field that is looked at.
+    pub work: Option<&'a FieldWork>,
 }
 
 impl Choice<'_> {
     /// What of a setting's picture is there before its first sample, and what a sample takes, ms.
     fn picture_ms(&self, p: &Pilot) -> [f64; 2] {
-        let technique = &p.candidate.technique;
-        let seen = |q: &&Pilot| q.whole.is_some() && q.candidate.technique == *technique;
+        let technique = p.setting.technique;
+        let seen = |q: &&Pilot| q.whole.is_some() && q.setting.technique == technique;
         match (p.whole, self.pilots.iter().find(seen)) {
             (Some(whole), _) => whole,
             // Of another setting of it the whole picture was begun: this one costs as much more there as in its pilot.
@@ -82,27 +83,27 @@ impl Choice<'_> {
     /// Device time, ms.
     pub(super) fn cost(&self, p: &Pilot, amount: Amount) -> f64 {
         let [besides, sample] = self.picture_ms(p);
-        let field = self.photons.zip(amount.photons).map_or(0.0, |(photons, n)| photons.cost(n, besides + sample));
+        let field = self.work.zip(amount.work).map_or(0.0, |(work, n)| work.cost(n.amount, besides + sample));
         field + besides + sample * f64::from(amount.samples)
     }
 
     pub(super) fn error(&self, p: &Pilot, amount: Amount) -> f64 {
-        let of_field = self.photons.zip(amount.photons).map_or(0.0, |(photons, n)| photons.squared_after(n, 1.0));
+        let of_field = self.work.zip(amount.work).map_or(0.0, |(work, n)| work.squared_after(n.amount, 1.0));
         (p.error_after(f64::from(amount.samples), self.places).powi(2) + of_field).sqrt()
     }
 
     /// The cheapest amount that is wrong by no more than what is asked for.
     fn for_error(&self, p: &Pilot) -> Option<Amount> {
-        let error = AIM * self.wish.error;
+        let error = AIM * self.target.error;
         let samples = |error: f64| p.samples_for(error, self.places, self.most);
-        let Some(photons) = self.photons else {
-            return samples(error).map(|samples| Amount { samples, photons: None });
+        let Some(work) = self.work else {
+            return samples(error).map(|samples| Amount { samples, work: None });
         };
         let split = |part: f64| {
             let samples = samples(part.sqrt() * error)?;
             let view = p.squared_after(f64::from(samples), self.places, p.chance) + (p.bias + p.bias_within).powi(2);
-            let photons = photons.needed(error * error - view)?;
-            Some(Amount { samples, photons: Some(photons) })
+            let needed = work.needed(error * error - view)?;
+            Some(Amount { samples, work: Some(work.of(needed)) })
         };
         parts().filter_map(split).min_by(|a, b| self.cost(p, *a).total_cmp(&self.cost(p, *b)))
     }
@@ -111,34 +112,34 @@ impl Choice<'_> {
     fn in_time(&self, p: &Pilot) -> Option<Amount> {
         let [besides, sample] = self.picture_ms(p);
         let samples = |ms: f64| (((ms - besides) / sample).floor().max(1.0) as u32).min(self.most);
-        let time = self.wish.time_ms?;
-        let Some(photons) = self.photons else { return Some(Amount { samples: samples(time), photons: None }) };
-        let left = time - photons.cost(0, besides + sample);
+        let time = self.target.time_ms?;
+        let Some(work) = self.work else { return Some(Amount { samples: samples(time), work: None }) };
+        let left = time - work.cost(0, besides + sample);
         let split = |part: f64| {
-            let n = photons.in_time((1.0 - part) * left);
-            Amount { samples: samples(time - photons.cost(n, besides + sample)), photons: Some(n) }
+            let n = work.in_time((1.0 - part) * left);
+            Amount { samples: samples(time - work.cost(n, besides + sample)), work: Some(work.of(n)) }
         };
         parts().map(split).min_by(|a, b| self.error(p, *a).total_cmp(&self.error(p, *b)))
     }
 
     /// As near as a setting comes: beside a field's error a view's need not be any smaller.
     fn nearest(&self, p: &Pilot) -> Amount {
-        let Some(photons) = self.photons else { return Amount { samples: self.most, photons: None } };
-        let n = photons.given.unwrap_or(photons.most);
-        let room = SMALL * photons.squared_after(n, 1.0);
+        let Some(work) = self.work else { return Amount { samples: self.most, work: None } };
+        let n = work.given.unwrap_or(work.most);
+        let room = SMALL * work.squared_after(n, 1.0);
         let enough = |samples: &u32| p.squared_after(f64::from(*samples), self.places, 1.0) <= room;
         let samples = (0..31).map(|power| 1 << power).take_while(|n| *n < self.most).find(enough);
-        Amount { samples: samples.unwrap_or(self.most), photons: Some(n) }
+        Amount { samples: samples.unwrap_or(self.most), work: Some(work.of(n)) }
     }
 
     /// Chooses.
     pub fn choose(&self) -> Chosen {
-        let Self { pilots, wish, .. } = *self;
+        let Self { pilots, target, .. } = *self;
         let for_error: Vec<Option<Amount>> = pilots.iter().map(|p| self.for_error(p)).collect();
-        let in_time = |p: &Pilot, n: &Amount| wish.time_ms.is_none_or(|t| self.cost(p, *n) <= t);
+        let in_time = |p: &Pilot, n: &Amount| target.time_ms.is_none_or(|t| self.cost(p, *n) <= t);
         let each = || pilots.iter().zip(&for_error).enumerate();
         let enough = least(each().filter_map(|(i, (p, n))| {
-            let n = n.filter(|n| wish.says_error && in_time(p, n))?;
+            let n = n.filter(|n| target.says_error && in_time(p, n))?;
             Some((i, n, self.cost(p, n)))
         }));
         let nearest = || {
@@ -147,12 +148,12 @@ impl Choice<'_> {
                 (i, n, self.error(p, n) + p.bias_within)
             }))
         };
-        let none = (0, Amount { samples: self.most, photons: None });
+        let none = (0, Amount { samples: self.most, work: None });
         let (index, amount) = enough.or_else(nearest).unwrap_or(none);
         let best = &pilots[index];
         let (time, error) = (self.cost(best, amount), self.error(best, amount));
         let considered = pilots.iter().zip(&for_error).map(|(p, for_error)| {
-            let amount = if wish.says_error { *for_error } else { self.in_time(p) };
+            let amount = if target.says_error { *for_error } else { self.in_time(p) };
             self.considered(p, amount.map(|n| (n, self.cost(p, n))))
         });
         Chosen {
@@ -182,23 +183,14 @@ fn parts() -> impl Iterator<Item = f64> {
 
 #[cfg(test)]
 mod tests {
-    use serde_json::json;
-
-    use super::super::candidates::Candidate;
     use super::*;
+    use crate::technique::Setting;
 
     fn pilot(words: &str, noise_one: f64, bias: f64, ms: f64) -> Pilot {
-        let candidate = Candidate {
-            technique: "volume_path".into(),
-            own: json!({}),
-            lights: None,
-            level: None,
-            words: words.into(),
-            unbiased: bias == 0.0,
-            less: Vec::new(),
-        };
+        let unbiased = bias == 0.0;
+        let setting = Setting { unbiased, ..Setting::as_given("volume_path", words.into()) };
         Pilot {
-            candidate,
+            setting,
             random: noise_one * noise_one,
             chance: 1.0,
             bias,
@@ -209,24 +201,24 @@ mod tests {
         }
     }
 
-    fn wish(error: f64, time_ms: Option<f64>) -> Wish {
-        Wish { error, time_ms, says_error: true }
+    fn target(error: f64, time_ms: Option<f64>) -> Target {
+        Target { error, time_ms, says_error: true }
     }
 
-    fn chosen(pilots: &[Pilot], wish: Wish, photons: Option<&Photons>) -> Chosen {
+    fn chosen(pilots: &[Pilot], target: Target, work: Option<&FieldWork>) -> Chosen {
         let (places, calibration) = (&Places::default(), &Calibration::default());
-        Choice { pilots, places, wish, image: [100, 100], calibration, most: 1000, photons }.choose()
+        Choice { pilots, places, target, image: [100, 100], calibration, most: 1000, work }.choose()
     }
 
     #[test]
     fn the_cheapest_that_is_enough_is_taken() {
         let pilots = [pilot("all", 1.0, 0.0, 10.0), pilot("some", 1.0, 0.05, 2.0), pilot("few", 1.0, 0.5, 1.0)];
         // 0.99 × 0.2 = 0.198: √(0.198² − 0.05²) = 0.1916, 28 samples of 2 ms.
-        let loose = chosen(&pilots, wish(0.2, None), None);
+        let loose = chosen(&pilots, target(0.2, None), None);
         assert_eq!((loose.index, loose.amount.samples), (1, 28));
         assert!((loose.device_ms.value - 56.0).abs() < 1e-9 && loose.error.value <= 0.198, "{:?}", loose.device_ms);
         // 0.0495 is less than the bias of 0.05: all paths are needed, 409 of them.
-        let tight = chosen(&pilots, wish(0.05, None), None);
+        let tight = chosen(&pilots, target(0.05, None), None);
         assert_eq!((tight.index, tight.amount.samples), (0, 409));
         assert!(tight.considered[1].why.contains("however many"), "{:?}", tight.considered[1]);
     }
@@ -234,29 +226,42 @@ mod tests {
     #[test]
     fn in_a_given_time_the_most_accurate_is_taken() {
         let pilots = [pilot("all", 1.0, 0.0, 10.0), pilot("some", 1.0, 0.05, 2.0)];
-        let short = chosen(&pilots, Wish { says_error: false, ..wish(0.02, Some(100.0)) }, None);
+        let short = chosen(&pilots, Target { says_error: false, ..target(0.02, Some(100.0)) }, None);
         assert_eq!((short.index, short.amount.samples), (1, 50));
-        let long = chosen(&pilots, Wish { says_error: false, ..wish(0.02, Some(8000.0)) }, None);
+        let long = chosen(&pilots, Target { says_error: false, ..target(0.02, Some(8000.0)) }, None);
         assert_eq!((long.index, long.amount.samples), (0, 800));
-        let both = chosen(&pilots, wish(0.02, Some(100.0)), None);
+        let both = chosen(&pilots, target(0.02, Some(100.0)), None);
         assert!(both.reasons[0].contains("nothing is within 2.00 % in 100 ms"), "{:?}", both.reasons);
     }
 
     #[test]
-    fn photons_and_samples_share_an_error_and_a_time() {
+    fn work_and_samples_share_an_error_and_a_time() {
         let pilots = [pilot("all", 1.0, 0.0, 1.0)];
-        let photons = Photons { squared: 1000.0, chance: 1.0, ms: [0.0, 1e-3], given: None, most: u64::MAX };
+        let work = FieldWork {
+            of: "photons",
+            squared: 1000.0,
+            chance: 1.0,
+            ms: [0.0, 1e-3],
+            given: None,
+            most: u64::MAX,
+            looks: 5,
+        };
         // 0.099² = 1/n + 1000/N costs n + N/1000 + 5, the least where n = N/1000: 205 of each.
-        let error = chosen(&pilots, wish(0.1, None), Some(&photons));
-        let n = error.amount.photons.unwrap_or(0);
+        let error = chosen(&pilots, target(0.1, None), Some(&work));
+        let n = error.amount.work.map_or(0, |w| w.amount);
         assert!((195..=215).contains(&error.amount.samples) && (195_000..=215_000).contains(&n), "{:?}", error.amount);
         assert!(error.enough && error.error.value <= 0.099 && error.device_ms.value < 420.0, "{:?}", error.device_ms);
         // What is left of 205 ms after the pictures on the way, a half each.
-        let time = chosen(&pilots, Wish { says_error: false, ..wish(0.1, Some(205.0)) }, Some(&photons));
+        let time = chosen(&pilots, Target { says_error: false, ..target(0.1, Some(205.0)) }, Some(&work));
         assert!((95..=105).contains(&time.amount.samples) && time.device_ms.value <= 205.0, "{:?}", time.amount);
         // With too few photons no sample helps: of samples there are enough to be small beside them.
-        let given = Photons { given: Some(1000), ..photons };
-        let few = chosen(&pilots, wish(0.1, None), Some(&given));
-        assert_eq!((few.enough, few.amount), (false, Amount { samples: 16, photons: Some(1000) }), "{:?}", few.reasons);
+        let given = FieldWork { given: Some(1000), ..work };
+        let few = chosen(&pilots, target(0.1, None), Some(&given));
+        assert_eq!(
+            (few.enough, few.amount),
+            (false, Amount { samples: 16, work: Some(work.of(1000)) }),
+            "{:?}",
+            few.reasons
+        );
     }
 }

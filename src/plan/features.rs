@@ -1,14 +1,8 @@
 //! What a scene is like, as far as it decides how much model is needed.
 
 use serde::Serialize;
-use serde_json::Value;
 
-use super::candidates;
-use crate::scene::depth::greatest_along_axes;
-use crate::scene::lights::{LightSource, Lights};
-use crate::scene::medium::MediumRequest;
-use crate::scene::{Scene, radius};
-use crate::technique::slab::missing;
+use crate::render::Scene;
 use crate::volume::Volume;
 
 /// The features of a scene.
@@ -37,41 +31,22 @@ pub struct Features {
 }
 
 impl Features {
-    /// Those of a scene, of the request that it was made of.
-    pub fn of(scene: &Scene, volume: &Volume, request: &Value) -> Self {
-        let medium = medium(request);
-        let depth = medium.as_ref().map(|m| {
-            let sigma = m.sigma_t_per_unit(volume).into_iter().fold(0.0, f64::max);
-            greatest_along_axes(volume, |v| m.density_of(v)).map(|d| sigma * d)
-        });
-        let albedo = medium.as_ref().map(|m| m.albedo.rgb().into_iter().fold(0.0, f64::max));
+    /// Those of a scene.
+    pub fn of(scene: &Scene, volume: &Volume) -> Self {
+        let optics = scene.view().optics(volume);
         let voxel = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
         let width = volume.range()[1] - volume.range()[0];
-        let least = depth.map(|d| d.into_iter().fold(f64::INFINITY, f64::min));
         Self {
             homogeneous: volume.non_finite() == 0 && volume.range()[0] == volume.range()[1],
-            optical_depth: depth,
-            albedo,
-            anisotropy: medium.as_ref().and_then(|m| m.phase.mean_cosine()),
+            optical_depth: optics.as_ref().map(|o| o.optical_depth),
+            albedo: optics.as_ref().map(|o| o.albedo),
+            anisotropy: optics.as_ref().and_then(|o| o.anisotropy),
             steepest_slope: scene.view().steepest_slope(volume).map(|slope| slope * width * voxel),
             opaque: None,
-            multiple_scattering: least.zip(albedo).map(|(depth, albedo)| missing(depth, albedo, 1)),
-            light_shares: light_shares(volume, request),
+            multiple_scattering: optics.as_ref().map(|o| o.missing(1)),
+            light_shares: optics.map_or(Vec::new(), |o| o.light_shares),
             pixels_per_voxel: pixels_per_voxel(scene, volume),
         }
-    }
-
-    /// The bound on what is lost where light is followed through so many scatterings.
-    pub fn missing(&self, scatterings: u32) -> f64 {
-        let least = self.optical_depth.map_or(0.0, |d| d.into_iter().fold(f64::INFINITY, f64::min));
-        missing(least, self.albedo.unwrap_or(0.0), scatterings)
-    }
-
-    /// All lights but skies, by their places in the request, the faintest first.
-    pub fn faintest_lights(&self) -> Vec<usize> {
-        let mut shares = self.light_shares.clone();
-        shares.sort_by(|a, b| a.1.total_cmp(&b.1));
-        shares.into_iter().map(|(i, _)| i).collect()
     }
 
     /// In words, for a reader.
@@ -104,23 +79,6 @@ impl Features {
         }
         words
     }
-}
-
-/// The medium of a scattering request.
-fn medium(request: &Value) -> Option<MediumRequest> {
-    let technique = request["technique"].as_str()?;
-    if !matches!(technique, "volume_path" | "single_scatter") {
-        return None;
-    }
-    let given = request.get("medium").or_else(|| request[technique].get("medium"));
-    given.map_or_else(|| Some(MediumRequest::default()), |m| serde_json::from_value(m.clone()).ok())
-}
-
-fn light_shares(volume: &Volume, request: &Value) -> Vec<(usize, f64)> {
-    let given = candidates::lights(request).and_then(|l| serde_json::from_value::<Vec<LightSource>>(l.clone()).ok());
-    let lights = given.and_then(|sources| Lights::from_request(Some(&sources), "/lights").ok());
-    let shares = lights.map_or(Vec::new(), |l| l.shares(radius(volume)));
-    shares.into_iter().enumerate().filter_map(|(i, share)| Some((i, share?))).collect()
 }
 
 fn pixels_per_voxel(scene: &Scene, volume: &Volume) -> f64 {

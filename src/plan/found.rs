@@ -1,12 +1,12 @@
 //! What the pilots found, and a closer look at it where it may decide.
 
-use super::Considered;
-use super::candidates::Candidate;
 use super::noise::{Places, SMALL, in_common, random};
-use super::pilot::{PIXELS, Pilot, SAMPLES, chance, deviation};
+use super::pilot::{PIXELS, Pilot, SAMPLES, chance, deviation, lasting};
+use super::reply::Considered;
 use super::run::{Asked, Run, mean};
-use crate::error::Result;
-use crate::scene::region::Region;
+use crate::error::{Error, Result};
+use crate::render::region::Region;
+use crate::technique::Setting;
 
 /// Samples of a deeper look, of those that are likely to be planned, and of those of the one before.
 const DEEPER: [u32; 2] = [8, 16];
@@ -46,10 +46,62 @@ pub struct Found {
 }
 
 impl Found {
+    /// Runs a pilot of each setting; the first setting is the reference. One that leaves out more than one that leaves out too much for `most` is not run.
+    ///
+    /// # Errors
+    /// Those of the requests.
+    pub async fn of(asked: Asked<'_>, settings: &[Setting], most: f64) -> Result<Self> {
+        let region = Region::some(PIXELS, [0, 0], asked.image());
+        let mut found = Self::default();
+        let mut too_much: Vec<&str> = Vec::new();
+        for setting in settings {
+            if let Some(less) = setting.less.iter().find(|less| too_much.contains(&less.as_str())) {
+                too_much.push(&setting.words);
+                found
+                    .skipped
+                    .push(Considered::skipped(setting, format!("{less} leaves out less, and that is too much")));
+                continue;
+            }
+            let runs = asked.run_two(setting, region, SAMPLES).await?;
+            let scale = found.pilots.first().map_or_else(|| runs[0].mean(), |reference| reference.scale);
+            let (bias, bias_within) = match &found.reference {
+                Some([a, b]) if !setting.unbiased => {
+                    let apart = |run: &Run, other: &Run, i: usize| (run.luminance(i) - other.luminance(i)) / scale;
+                    lasting((0..a.pixels).map(|i| apart(&runs[0], a, i) * apart(&runs[1], b, i)).collect())
+                }
+                _ => (0.0, 0.0),
+            };
+            if bias - bias_within > most {
+                too_much.push(&setting.words);
+            }
+            let [a, b] = [runs[0].rounds(), runs[1].rounds()];
+            let (random, seen) = random(a, b, scale);
+            if found.reference.is_none() {
+                found.matter = runs[0].film.random_noise().1;
+                found.places = Places::by_two(a, b, scale, deviation(found.matter));
+                found.everywhere = found.places.clone();
+                found.opaque = runs[0].opaque();
+            }
+            found.pilots.push(Pilot {
+                setting: setting.clone(),
+                random,
+                // There are more pixels in the picture, of the same kinds.
+                chance: chance(seen * f64::from(region.apart).powi(2), seen * a.len() as f64),
+                bias,
+                bias_within,
+                scale,
+                ms_per_sample: runs[0].ms[1].min(runs[1].ms[1]) / runs[0].pixels as f64,
+                whole: None,
+            });
+            found.reference.get_or_insert(runs);
+        }
+        if found.pilots.is_empty() { Err(Error::internal("no setting is possible")) } else { Ok(found) }
+    }
+
     /// What the places miss in the part of the picture where that is.
-    async fn look_at_part(&self, asked: Asked<'_>, candidate: &Candidate, samples: u32, scale: f64) -> Result<Places> {
+    async fn look_at_part(&self, asked: Asked<'_>, setting: &Setting, samples: u32, scale: f64) -> Result<Places> {
         let Some((region, part)) = self.part else { return Ok(self.places.clone()) };
-        let [a, b] = asked.run_two(candidate, region, samples).await?;
+        let [a, b] = asked.run_two(setting, region, samples).await?;
         let within = deviation(a.film.random_noise().1);
         let places = Places::by_two(a.rounds(), b.rounds(), scale / part.sqrt(), within);
         // Few samples that are good there may be bad elsewhere, as along an edge of another direction.
@@ -68,10 +120,10 @@ impl Found {
             return Ok(false);
         }
         if self.part.is_some() {
-            self.places = self.look_at_part(asked, &pilot.candidate, deep, pilot.scale).await?;
+            self.places = self.look_at_part(asked, &pilot.setting, deep, pilot.scale).await?;
         } else {
-            let region = Region::some(PIXELS, [0, 0], asked.image);
-            let run = asked.run(&pilot.candidate, region, deep, 1).await?;
+            let region = Region::some(PIXELS, [0, 0], asked.image());
+            let run = asked.run(&pilot.setting, region, deep, 1).await?;
             self.places.look_deeper(run.rounds(), pilot.scale, pilot.random);
         }
         Ok(true)
@@ -83,32 +135,32 @@ impl Found {
     /// # Errors
     /// Those of the request.
     pub async fn confirm(&mut self, asked: Asked<'_>, index: usize) -> Result<bool> {
-        let Pilot { candidate, ms_per_sample, whole: None, .. } = self.pilots[index].clone() else { return Ok(false) };
-        let sample = ms_per_sample * f64::from(asked.image[0]) * f64::from(asked.image[1]);
-        let (samples, whole) = (CONFIRMED[usize::from(sample > SHORT)], Region::every(1, asked.image));
-        let runs = asked.run_two(&candidate, whole, samples).await?;
+        let Pilot { setting, ms_per_sample, whole: None, .. } = self.pilots[index].clone() else { return Ok(false) };
+        let sample = ms_per_sample * f64::from(asked.image()[0]) * f64::from(asked.image()[1]);
+        let (samples, whole) = (CONFIRMED[usize::from(sample > SHORT)], Region::every(1, asked.image()));
+        let runs = asked.run_two(&setting, whole, samples).await?;
         let mut ms = [0, 1].map(|i| runs[0].ms[i].min(runs[1].ms[i]));
         if ms[0] + ms[1] < SHORT {
-            let again = asked.run(&candidate, whole, samples, 1).await?;
+            let again = asked.run(&setting, whole, samples, 1).await?;
             ms = [0, 1].map(|i| ms[i].min(again.ms[i]));
         }
         // The picture may have millions of pixels: the runtime's other work goes on meanwhile.
-        let seen = tokio::task::block_in_place(|| WholePicture::of(&runs, asked.image));
+        let seen = tokio::task::block_in_place(|| WholePicture::of(&runs, asked.image()));
         let more = if self.pilots[index].random > 0.0 { seen.random / self.pilots[index].random } else { 1.0 };
         self.pilots.iter_mut().filter(|p| p.whole.is_none()).for_each(|p| p.random *= more);
         let pilot = &mut self.pilots[index];
         (pilot.random, pilot.whole) = (seen.random, Some(ms));
         pilot.chance = chance(seen.matter, seen.matter * f64::from(samples));
-        self.look_closer(asked, &candidate, &seen).await?;
+        self.look_closer(asked, &setting, &seen).await?;
         Ok(true)
     }
 
     /// Where few pixels matter, as those around a lamp that is seen, a pilot has too few of them or none: the first samples of the whole
     /// picture tell how much the places miss and where that is.
-    async fn look_closer(&mut self, asked: Asked<'_>, candidate: &Candidate, seen: &WholePicture) -> Result<()> {
-        let by_chance = seen.random / f64::from(asked.image[0]).sqrt() / f64::from(asked.image[1]).sqrt();
+    async fn look_closer(&mut self, asked: Asked<'_>, setting: &Setting, seen: &WholePicture) -> Result<()> {
+        let by_chance = seen.random / f64::from(asked.image()[0]).sqrt() / f64::from(asked.image()[1]).sqrt();
         // A pilot that has all of the pixels has seen it.
-        let all = Region::some(PIXELS, [0, 0], asked.image).apart == 1;
+        let all = Region::some(PIXELS, [0, 0], asked.image()).apart == 1;
         if all || self.part.is_some() || seen.missed <= (SURE * by_chance).max(SMALL * seen.random) {
             return Ok(());
         }
@@ -119,8 +171,8 @@ impl Found {
         }
         if let Some((region, share)) = seen.around.filter(|_| differs) {
             let pixels = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
-            self.part = Some((region, pixels(region.size) / pixels(asked.image) / share));
-            self.places = self.look_at_part(asked, candidate, SAMPLES, seen.scale).await?;
+            self.part = Some((region, pixels(region.size) / pixels(asked.image()) / share));
+            self.places = self.look_at_part(asked, setting, SAMPLES, seen.scale).await?;
         }
         Ok(())
     }

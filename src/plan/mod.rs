@@ -4,22 +4,21 @@
 //! `settings` that could do, less those that a bound rules out; a `pilot` of a few thousand pixels of the picture itself measures what each
 //! of the rest costs here and is wrong by; what was `found` is looked at closer where that might be the best, and the likely one is
 //! confirmed on the whole picture; `choose` takes the cheapest that is enough, or the best that is in time, and says why in `words`. Of a
-//! field that is yet to be computed some small ones stand for it, and tell how many `photons` its picture needs.
+//! field that is yet to be computed some small ones stand for it, and tell how much of its `field_work` its picture needs.
 //!
 //! What grows how is what the study measured: random `noise` falls as the root of the samples, what the places in a pixel miss by a power
 //! between ½ and 1 and not everywhere; time is linear in samples and pixels.
 
 mod calibration;
-mod candidates;
 mod choose;
 pub mod features;
+mod field_work;
 mod found;
 mod noise;
-mod photons;
 mod pilot;
 mod reply;
 mod run;
-mod settings;
+mod target;
 mod words;
 
 use serde_json::{Value, json};
@@ -27,33 +26,35 @@ use serde_json::{Value, json};
 use crate::config::Limits;
 use crate::error::{Error, Result};
 use crate::job::Engine;
-use crate::scene::{Scene, Subject};
-use crate::volume::Store;
+use crate::render::{AUTO, Scene, Subject};
+use crate::technique::{self, Open, Setting, Settings, Technique};
+use crate::volume::{MOST_LEVEL, Store, Volume};
 pub use calibration::Calibrations;
-pub use candidates::is_auto;
-use candidates::{Candidate, Family};
 use choose::{Choice, Chosen};
 use features::Features;
+use field_work::{FieldWork, Simulated};
 use found::Found;
-use photons::{Photons, Simulated};
 use pilot::Pilot;
-pub use reply::{Considered, Plan, Predicted};
+pub use reply::{Considered, FieldAmount, Plan, Predicted};
 use run::Asked;
-
-/// What is asked for where the budget is silent.
-const USUAL_ERROR: f64 = 0.02;
+use target::Target;
 
 /// How often one plan looks deeper or at the whole picture, at most.
 const LOOKS: usize = 12;
 /// Of fewer samples than these the film knows its noise less well than a pilot.
 const FEW: u32 = 8;
+/// How wide the voxels of a coarser level may be on the picture, pixels.
+const WIDEST_PIXELS: f64 = 2.0;
 
 /// What is looked at.
 struct Seen {
-    /// As the reference shows it.
+    /// The scene as it was asked for.
+    asked: Scene,
+    /// The same, looking at a volume that is there.
     scene: Scene,
     simulated: Option<Simulated>,
     features: Features,
+    open: bool,
 }
 
 /// What planning needs.
@@ -79,37 +80,35 @@ impl Planner<'_> {
         }
         // One for all of its pilots.
         let _place = self.engine.reserve()?;
-        let family = Family::of(body);
-        let mut seen = self.see(body, family).await?;
-        let wish = Wish::of(&seen.scene);
-        let (candidates, mut considered) = settings::candidates(body, family, &seen.features, wish.error);
-        let possible: Vec<Candidate> =
-            candidates.into_iter().filter(|c| self.scene(&c.request(body)).is_ok()).collect();
-        let field = seen.simulated.as_ref().map(Simulated::volume);
-        let asked = Asked { planner: self, body, image: seen.scene.image(), field };
+        let mut seen = self.see(body).await?;
+        let target = Target::of(&seen.scene);
+        let asked = Asked { planner: self, scene: &seen.scene };
+        let Settings { all, ruled_out } = seen.settings(target.error);
+        let skipped = |(setting, bound, why)| Considered { bias: Some(bound), ..Considered::skipped(&setting, why) };
+        let mut considered: Vec<Considered> = ruled_out.into_iter().map(skipped).collect();
         // What is wrong by too much is of no use, unless all that there is time for is.
-        let useless = if wish.time_ms.is_none() { wish.error } else { f64::INFINITY };
-        let mut found = pilot::run_all(asked, &possible, useless).await?;
-        seen.features.opaque = (family != Family::Scattering).then_some(found.opaque);
-        let photons = match &seen.simulated {
-            Some(simulated) => Some(simulated.photons(asked, &found, seen.features.pixels_per_voxel).await?),
+        let useless = if target.time_ms.is_none() { target.error } else { f64::INFINITY };
+        let mut found = Found::of(asked, &all, useless).await?;
+        seen.features.opaque = seen.features.optical_depth.is_none().then_some(found.opaque);
+        let work = match &seen.simulated {
+            Some(simulated) => Some(simulated.work(asked, &seen.asked, &found, seen.features.pixels_per_voxel).await?),
             None => None,
         };
-        let chosen = self.choose(asked, &mut found, wish, photons.as_ref()).await?;
+        let chosen = self.choose(asked, &mut found, target, work.as_ref()).await?;
         considered.splice(0..0, chosen.considered.into_iter().chain(found.skipped));
         let best = &found.pilots[chosen.index];
-        let mut request = best.candidate.request(body);
-        request["budget"] = budget(best, chosen.amount.samples, chosen.enough && photons.is_none(), wish);
-        if let Some((simulated, photons)) = seen.simulated.as_ref().zip(chosen.amount.photons) {
-            simulated.with_photons(&mut request, photons);
+        let mut request = reply::request(body, &best.setting);
+        request["budget"] = budget(best, &seen.scene, &chosen.amount, chosen.enough && work.is_none(), target)?;
+        if let Some((simulated, work)) = seen.simulated.as_ref().zip(chosen.amount.work) {
+            simulated.put_into(&mut request, work.amount);
         }
         let mut reasons = seen.features.words();
         reasons.extend(chosen.reasons);
         Ok(Plan {
-            technique: best.candidate.technique.clone(),
-            options: best.candidate.own.clone(),
+            technique: best.setting.technique.into(),
+            options: Value::Object(reply::options(body, &best.setting)),
             samples: chosen.amount.samples,
-            photons: chosen.amount.photons,
+            work: chosen.amount.work,
             device_ms: chosen.device_ms,
             error: chosen.error,
             reasons,
@@ -124,20 +123,19 @@ impl Planner<'_> {
         &self,
         asked: Asked<'_>,
         found: &mut Found,
-        wish: Wish,
-        photons: Option<&Photons>,
+        target: Target,
+        work: Option<&FieldWork>,
     ) -> Result<Chosen> {
         let calibration = self.calibrations.of(self).await?;
-        let samples = asked.body.pointer("/budget/samples").and_then(Value::as_u64).map_or(u32::MAX, |n| n as u32);
-        let most = self.limits.max_samples.min(samples);
+        let most = self.limits.max_samples.min(asked.scene.asked_samples().unwrap_or(u32::MAX));
         let choose = |found: &Found| {
-            let (Found { pilots, places, .. }, image, calibration) = (found, asked.image, &calibration);
-            Choice { pilots, places, wish, image, calibration, most, photons }.choose()
+            let (Found { pilots, places, .. }, image, calibration) = (found, asked.image(), &calibration);
+            Choice { pilots, places, target, image, calibration, most, work }.choose()
         };
         let mut chosen = choose(found);
         for _ in 0..LOOKS {
             let looked = (chosen.enough && found.deepen(asked, chosen.index, chosen.amount.samples).await?)
-                || ((chosen.enough || wish.time_ms.is_some()) && found.confirm(asked, chosen.index).await?);
+                || ((chosen.enough || target.time_ms.is_some()) && found.confirm(asked, chosen.index).await?);
             if !looked && !std::mem::take(&mut found.places.hopeful) {
                 break;
             }
@@ -147,21 +145,26 @@ impl Planner<'_> {
         Ok(choose(found))
     }
 
-    /// What a request looks at, as the planner sees it: of a field that is yet to be computed a simulation of few photons.
-    async fn see(&self, body: &Value, family: Family) -> Result<Seen> {
-        let scene = self.reference(body, family)?;
-        let reference = settings::reference(body, family);
-        let simulated = match scene.subject() {
+    /// What a request looks at, as the planner sees it: of a field that is yet to be computed a simulation of little work.
+    async fn see(&self, body: &Value) -> Result<Seen> {
+        let technique = technique_of(body);
+        let mut with_technique = body.clone();
+        if reply::is_open(body) {
+            let setting = Setting::as_given(technique.name, String::new());
+            with_technique["technique"] = json!(technique.name);
+            with_technique[technique.name] = Value::Object(reply::options(body, &setting));
+        }
+        let asked = self.scene(&with_technique)?;
+        let simulated = match asked.subject() {
             Subject::Volume(_) => None,
-            Subject::Field(_) => Some(Simulated::of(self, body, &reference).await?),
+            Subject::Field(..) => Some(Simulated::of(self, &asked).await?),
         };
-        let volume = match (scene.subject(), &simulated) {
-            (_, Some(simulated)) => simulated.volume(),
-            (Subject::Volume(volume), _) => volume,
-            (Subject::Field(_), None) => return Err(Error::internal("a field that was not simulated")),
+        let scene = match &simulated {
+            Some(simulated) => asked.looking_at(Subject::Volume(simulated.volume().clone())),
+            None => asked.clone(),
         };
-        let features = Features::of(&scene, volume, &reference.request(body));
-        Ok(Seen { scene, simulated, features })
+        let features = Features::of(&scene, volume_of(&scene)?);
+        Ok(Seen { asked, scene, simulated, features, open: body["technique"] == AUTO })
     }
 
     /// Measures what is to be known of this device, unless that is known.
@@ -177,11 +180,8 @@ impl Planner<'_> {
     /// # Errors
     /// Those of the request.
     pub async fn settings(&self, body: &Value) -> Result<Vec<(String, Value)>> {
-        let family = Family::of(body);
-        let features = self.see(body, family).await?.features;
-        let (candidates, _) = settings::candidates(body, family, &features, f64::INFINITY);
-        let requests = candidates.into_iter().map(|c| (c.words.clone(), c.request(body)));
-        Ok(requests.filter(|(_, request)| self.scene(request).is_ok()).collect())
+        let settings = self.see(body).await?.settings(f64::INFINITY);
+        Ok(settings.all.iter().map(|s| (s.words.clone(), reply::request(body, s))).collect())
     }
 
     /// The request to render, and what the planner says of it: of another technique than `auto` the request as it is.
@@ -189,7 +189,7 @@ impl Planner<'_> {
     /// # Errors
     /// As [`Planner::plan`].
     pub async fn resolve(&self, body: Value) -> Result<(Value, Option<Value>)> {
-        if !body.is_object() || !is_auto(&body) {
+        if body["technique"] != AUTO {
             return Ok((body, None));
         }
         let plan = self.plan(&body).await?;
@@ -201,57 +201,63 @@ impl Planner<'_> {
         Ok((request, Some(words)))
     }
 
-    /// The scene of the reference, after the request has been looked at as it came.
-    fn reference(&self, body: &Value, family: Family) -> Result<Scene> {
-        let as_it_came = match &body["technique"] {
-            Value::Null => candidates::with_technique(body, family.technique()),
-            _ if is_auto(body) => candidates::with_technique(body, family.technique()),
-            _ => body.clone(),
-        };
-        self.scene(&as_it_came)?;
-        self.scene(&settings::reference(body, family).request(body))
-    }
-
     fn scene(&self, request: &Value) -> Result<Scene> {
         // A volume may have to be decoded first: the runtime's other work goes on meanwhile.
         tokio::task::block_in_place(|| Scene::from_json(request, self.store, self.limits))
     }
 }
 
-/// A plan's samples are enough by what the pilots know; where the film finds that it is so sooner, the render stops.
-fn budget(best: &Pilot, samples: u32, enough: bool, wish: Wish) -> Value {
-    let room = (choose::AIM * wish.error).powi(2) - (best.bias + best.bias_within).powi(2);
-    let mut budget = json!({"samples": samples});
-    // Where a stepping view finds its step too long it starts over with a shorter one: what the plan knows better.
-    if enough
-        && Family::of(&json!({"technique": best.candidate.technique})) == Family::Scattering
-        && room > 0.0
-        && samples >= FEW
-    {
+impl Seen {
+    /// The settings that could do, the reference first; those that do not go together with the scene are left out.
+    fn settings(&self, error: f64) -> Settings {
+        let name = self.scene.technique().name;
+        let as_given =
+            || Settings { all: vec![Setting::as_given(name, format!("{name} as it is given"))], ruled_out: Vec::new() };
+        let Ok(volume) = volume_of(&self.scene) else { return as_given() };
+        let open = Open { given: self.scene.given(), auto: self.open, levels: self.levels(), error };
+        let mut settings = self.scene.view().settings(volume, &open).unwrap_or_else(as_given);
+        tokio::task::block_in_place(|| settings.all.retain(|setting| self.scene.with_setting(setting).is_ok()));
+        settings
+    }
+
+    /// The levels that may stand for the volume: their voxels are hardly wider than a pixel.
+    fn levels(&self) -> Vec<usize> {
+        let fixed = self.scene.level().is_some() || self.simulated.is_some() || self.scene.view().shows_labels();
+        let wide = |level: usize| self.features.pixels_per_voxel * (1u64 << level) as f64;
+        (1..=MOST_LEVEL).take_while(|level| !fixed && wide(*level) <= WIDEST_PIXELS).collect()
+    }
+}
+
+/// The volume that a scene looks at.
+fn volume_of(scene: &Scene) -> Result<&Volume> {
+    match scene.subject() {
+        Subject::Volume(volume) => Ok(volume),
+        Subject::Field(..) => Err(Error::internal("a field that was not simulated")),
+    }
+}
+
+/// The technique that a request is planned as. Where it names none, that is the complete technique of what it says of the scene, or the first
+/// of the list.
+fn technique_of(body: &Value) -> &'static Technique {
+    let complete = |t: &Technique| technique::find(t.complete());
+    let shares = |t: &&Technique| t.shares.iter().any(|section| body.get(section).is_some());
+    let named = body["technique"].as_str().and_then(technique::find);
+    let sharing = || technique::views().find(shares).and_then(complete);
+    let given = || technique::views().find(|t| body.get(t.name).is_some()).and_then(complete);
+    named.or_else(sharing).or_else(given).unwrap_or(&technique::ALL[0])
+}
+
+/// A plan's samples are enough by what the pilots know; where the film finds that it is so sooner, the render stops. A stepping view that
+/// finds its step too long starts over with a shorter one, which the plan knows better.
+fn budget(best: &Pilot, scene: &Scene, amount: &choose::Amount, enough: bool, target: Target) -> Result<Value> {
+    let room = (choose::AIM * target.error).powi(2) - (best.bias + best.bias_within).powi(2);
+    let mut budget = json!({"samples": amount.samples});
+    let is_random = scene.with_setting(&best.setting)?.view().random().is_some();
+    if enough && is_random && room > 0.0 && amount.samples >= FEW {
         budget["max_error"] = json!(room.sqrt() / best.chance);
     }
-    if let Some(time) = wish.time_ms {
+    if let Some(time) = target.time_ms {
         budget["time_ms"] = json!(time as u64);
     }
-    budget
-}
-
-/// What is asked for.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Wish {
-    error: f64,
-    time_ms: Option<f64>,
-    /// Whether the error was asked for, or is only the usual one.
-    says_error: bool,
-}
-
-impl Wish {
-    fn of(scene: &Scene) -> Self {
-        let budget = scene.budget();
-        Self {
-            error: budget.max_error.unwrap_or(USUAL_ERROR),
-            time_ms: budget.time_ms.map(|t| t as f64),
-            says_error: budget.max_error.is_some() || budget.time_ms.is_none(),
-        }
-    }
+    Ok(budget)
 }

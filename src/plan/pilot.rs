@@ -3,12 +3,9 @@
 //! What is left out is the mean over the pixels of d₁ d₂, where d is the difference to the reference with seeds of their own: noise of the
 //! two is independent and averages to nothing, and places in a pixel are the same for both. What more samples take away is in `noise`.
 
-use super::candidates::Candidate;
-use super::found::Found;
-use super::noise::{Places, random};
-use super::run::{Asked, Run, mean};
-use crate::error::{Error, Result};
-use crate::scene::region::Region;
+use super::noise::Places;
+use super::run::mean;
+use crate::technique::Setting;
 
 /// Pixels of a pilot, about.
 pub const PIXELS: f64 = 4096.0;
@@ -20,10 +17,10 @@ const ONE_IN_TWENTY: f64 = 1.645;
 const GROUPS: usize = 16;
 
 /// What a pilot found.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Pilot {
     /// Of what.
-    pub candidate: Candidate,
+    pub setting: Setting,
     /// J² of `noise`, relative: the variance that random numbers bring into a sample.
     pub random: f64,
     /// How much more than its random part a picture may be wrong by chance.
@@ -83,59 +80,9 @@ pub fn chance(pixels: f64, numbers: f64) -> f64 {
     (1.0 + ONE_IN_TWENTY * variance.sqrt()).sqrt()
 }
 
-/// Runs the pilots; the first candidate is the reference. One that leaves out more than one that leaves out too much for `most` is not run.
-///
-/// # Errors
-/// Those of the requests.
-pub async fn run_all(asked: Asked<'_>, candidates: &[Candidate], most: f64) -> Result<Found> {
-    let region = Region::some(PIXELS, [0, 0], asked.image);
-    let mut found = Found::default();
-    let mut too_much: Vec<&str> = Vec::new();
-    for candidate in candidates {
-        if let Some(less) = candidate.less.iter().find(|less| too_much.contains(&less.as_str())) {
-            too_much.push(&candidate.words);
-            found.skipped.push(candidate.skipped(format!("{less} leaves out less, and that is too much")));
-            continue;
-        }
-        let runs = asked.run_two(candidate, region, SAMPLES).await?;
-        let scale = found.pilots.first().map_or_else(|| runs[0].mean(), |reference| reference.scale);
-        let (bias, bias_within) = match &found.reference {
-            Some([a, b]) if !candidate.unbiased => {
-                let apart = |run: &Run, other: &Run, i: usize| (run.luminance(i) - other.luminance(i)) / scale;
-                lasting((0..a.pixels).map(|i| apart(&runs[0], a, i) * apart(&runs[1], b, i)).collect())
-            }
-            _ => (0.0, 0.0),
-        };
-        if bias - bias_within > most {
-            too_much.push(&candidate.words);
-        }
-        let [a, b] = [runs[0].rounds(), runs[1].rounds()];
-        let (random, seen) = random(a, b, scale);
-        if found.reference.is_none() {
-            found.matter = runs[0].film.random_noise().1;
-            found.places = Places::by_two(a, b, scale, deviation(found.matter));
-            found.everywhere = found.places.clone();
-            found.opaque = runs[0].opaque();
-        }
-        found.pilots.push(Pilot {
-            candidate: candidate.clone(),
-            random,
-            // There are more pixels in the picture, of the same kinds.
-            chance: chance(seen * f64::from(region.apart).powi(2), seen * a.len() as f64),
-            bias,
-            bias_within,
-            scale,
-            ms_per_sample: runs[0].ms[1].min(runs[1].ms[1]) / runs[0].pixels as f64,
-            whole: None,
-        });
-        found.reference.get_or_insert(runs);
-    }
-    if found.pilots.is_empty() { Err(Error::internal("no candidate is possible")) } else { Ok(found) }
-}
-
 /// The root of the mean of the products d₁ d₂ of the pixels, and how much more it might be: two deviations, by the spread over groups of
 /// pixels.
-fn lasting(products: Vec<f64>) -> (f64, f64) {
+pub fn lasting(products: Vec<f64>) -> (f64, f64) {
     let count = GROUPS.min(products.len());
     let groups: Vec<f64> = (0..count).map(|g| mean(products.iter().skip(g).step_by(count).copied())).collect();
     let middle = mean(groups.iter().copied());

@@ -2,16 +2,13 @@
 
 use std::sync::Arc;
 
-use serde_json::{Value, json};
-
 use super::Planner;
-use super::candidates::Candidate;
 use crate::error::{Error, Result};
 use crate::film::{Film, Round};
-use crate::job::{Engine, Job, State};
-use crate::scene::Scene;
-use crate::scene::region::Region;
-use crate::volume::Volume;
+use crate::job::{CancelOnDrop, Job, State};
+use crate::render::Scene;
+use crate::render::region::Region;
+use crate::technique::Setting;
 
 /// From this alpha on a pixel counts as opaque.
 const OPAQUE: f32 = 0.99;
@@ -48,63 +45,47 @@ impl Run {
     }
 }
 
-/// A pilot that is not waited for any more, as when a client goes away, is cancelled.
-struct CancelOnDrop<'a> {
-    engine: &'a Engine,
-    job: Arc<Job>,
-}
-
-impl Drop for CancelOnDrop<'_> {
-    fn drop(&mut self) {
-        self.engine.cancel(&self.job);
-    }
-}
-
-/// What is planned, for the runs of its pilots.
+/// The scene that is planned, for the runs of its pilots.
 #[derive(Clone, Copy)]
 pub struct Asked<'a> {
     /// Runs them.
     pub planner: &'a Planner<'a>,
-    /// The request.
-    pub body: &'a Value,
-    /// The picture's sides.
-    pub image: [u32; 2],
-    /// What is looked at in place of a field that is yet to be computed.
-    pub field: Option<&'a Arc<Volume>>,
+    /// The scene as it was asked for, looking at a volume that is there.
+    pub scene: &'a Scene,
 }
 
 impl Asked<'_> {
-    /// Runs a candidate on some pixels.
+    /// The picture's sides.
+    pub fn image(&self) -> [u32; 2] {
+        self.scene.image()
+    }
+
+    /// Runs a setting on some pixels.
     ///
     /// # Errors
-    /// Those of the request.
-    pub async fn run(&self, candidate: &Candidate, region: Region, samples: u32, seed: u64) -> Result<Run> {
-        let mut request = candidate.request(self.body);
-        request["budget"] = json!({"samples": samples.min(self.planner.limits.max_samples)});
-        request["seed"] = json!(seed);
-        finish(self.planner, request, region, self.field).await
+    /// Those of the render.
+    pub async fn run(&self, setting: &Setting, region: Region, samples: u32, seed: u64) -> Result<Run> {
+        let samples = samples.min(self.planner.limits.max_samples);
+        // A coarser level may have to be made first: the runtime's other work goes on meanwhile.
+        let scene = tokio::task::block_in_place(|| self.scene.with_setting(setting))?;
+        finish(self.planner, scene.with_seed(seed).into_pilot(region, samples)).await
     }
 
     /// Runs it with two seeds.
     ///
     /// # Errors
-    /// Those of the request.
-    pub async fn run_two(&self, candidate: &Candidate, region: Region, samples: u32) -> Result<[Run; 2]> {
-        Ok([self.run(candidate, region, samples, 1).await?, self.run(candidate, region, samples, 2).await?])
+    /// Those of the render.
+    pub async fn run_two(&self, setting: &Setting, region: Region, samples: u32) -> Result<[Run; 2]> {
+        Ok([self.run(setting, region, samples, 1).await?, self.run(setting, region, samples, 2).await?])
     }
 }
 
-/// Runs a region of a request's picture to its end, unseen; of a field as it is there.
+/// Runs a pilot to its end, unseen.
 ///
 /// # Errors
-/// Those of the request.
-pub async fn finish(planner: &Planner<'_>, request: Value, region: Region, field: Option<&Arc<Volume>>) -> Result<Run> {
-    let scene = planner.scene(&request)?.into_pilot(region);
-    let scene = match field {
-        Some(field) => scene.looking_at(field.clone()),
-        None => scene,
-    };
-    let job = to_its_end(planner, request, scene).await?;
+/// Those of the render.
+pub async fn finish(planner: &Planner<'_>, pilot: Scene) -> Result<Run> {
+    let job = to_its_end(planner, pilot).await?;
     let failed = || Error::internal("a pilot without a film");
     let film = planner.engine.film(&job).await?;
     let rounds = &film.rounds;
@@ -114,16 +95,17 @@ pub async fn finish(planner: &Planner<'_>, request: Value, region: Region, field
     Ok(Run { pixels: film.main.pixels(), ms: [(first.device_ms - sample).max(0.0), sample], film })
 }
 
-/// Runs a scene to its end, unseen; where that is not waited for any more, it is cancelled.
+/// Runs a pilot to its end, unseen; where that is not waited for any more, it is cancelled.
 ///
 /// # Errors
 /// [`Error::Kernel`] where its kernel does not build, [`Error::Internal`] where it fails otherwise.
-pub async fn to_its_end(planner: &Planner<'_>, request: Value, scene: Scene) -> Result<Arc<Job>> {
-    let job = CancelOnDrop { engine: planner.engine, job: planner.engine.submit_pilot(request, scene) };
-    job.job.watch().wait_for(|u| u.state.is_terminal()).await.map(drop).map_err(Error::internal)?;
-    match job.job.state() {
-        State::Done => Ok(job.job.clone()),
-        _ => match job.job.failure() {
+pub async fn to_its_end(planner: &Planner<'_>, pilot: Scene) -> Result<Arc<Job>> {
+    let guard = CancelOnDrop::new(planner.engine, planner.engine.submit_pilot(pilot));
+    let job = guard.job();
+    job.watch().wait_for(|u| u.state.is_terminal()).await.map(drop).map_err(Error::internal)?;
+    match job.state() {
+        State::Done => Ok(job.clone()),
+        _ => match job.failure() {
             Some(unavailable @ Error::Kernel { .. }) => Err(unavailable),
             other => Err(Error::internal(format!("a pilot failed: {other:?}"))),
         },

@@ -1,6 +1,6 @@
 //! Transfer functions by name.
 
-use super::transfer::ControlPoint;
+use super::transfer_request::ControlPoint;
 
 /// sRGB's decoding (IEC 61966-2-1), for colours that are chosen by eye.
 pub fn linear(srgb: f64) -> f64 {

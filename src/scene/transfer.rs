@@ -1,9 +1,7 @@
 //! The transfer function: value to colour and opacity per unit length, as control points or a preset.
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
 use super::presets;
+pub use super::transfer_request::{ControlPoint, Label, TransferRequest};
 use crate::error::{Error, Result, Violation};
 use crate::volume::Volume;
 
@@ -11,67 +9,6 @@ use crate::volume::Volume;
 pub const TABLE_SIZE: usize = 4096;
 /// The optical depth that a preset's opacity 1 has across the volume's mean side: nearly opaque, still soft.
 const PRESET_OPTICAL_DEPTH: f64 = 24.0;
-
-/// A transfer function in a request: a preset, or control points.
-#[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct TransferRequest {
-    /// `ramp`, `hls` (hue by value, opacity by power), `ct_bone`, `mri_head`, `bone_flesh` (ivory bone in translucent flesh),
-    /// `blue_yellow` (blue and transparent, then yellow and opaque) or `labels` (a colour a whole number, 0 is empty). Default: what
-    /// suits the volume.
-    #[schemars(extend("enum" = ["ramp", "hls", "ct_bone", "mri_head", "bone_flesh", "blue_yellow", "labels"]))]
-    pub preset: Option<String>,
-    /// `hls`: turns the hue, in turns.
-    #[schemars(range(min = 0, max = 1))]
-    pub rotation: Option<f64>,
-    /// `hls`: opacity = pow(v / vmax, exponent).
-    #[schemars(range(min = 0.01, max = 20))]
-    pub exponent: Option<f64>,
-    /// The values that a preset spans. Default: the volume's range; for a computed field, 0 to what 99.8 % of its voxels stay below.
-    pub value_range: Option<[f64; 2]>,
-    /// Control points in rising order of value, linear between them, constant outside. Instead of a preset.
-    #[schemars(length(min = 1, max = 256))]
-    pub points: Option<Vec<ControlPoint>>,
-    /// The colours of a label volume, whose voxels are whole numbers. Instead of a preset.
-    #[schemars(length(min = 1, max = 4096))]
-    pub labels: Option<Vec<Label>>,
-}
-
-impl TransferRequest {
-    /// Whether it asks for a label volume's colours.
-    pub fn is_labels(&self) -> bool {
-        self.labels.is_some() || self.preset.as_deref() == Some("labels")
-    }
-}
-
-/// The look of one label.
-#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Label {
-    /// The voxels' value.
-    #[schemars(range(min = 0, max = 4095))]
-    pub label: u32,
-    /// Linear red, green, blue. Default: one of its own.
-    #[schemars(inner(range(min = 0, max = 1)))]
-    pub color: Option<[f64; 3]>,
-    /// Extinction per world unit.
-    #[schemars(range(min = 0, max = 1e6))]
-    pub opacity_per_unit: f64,
-}
-
-/// One control point.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ControlPoint {
-    /// The volume's value here.
-    pub value: f64,
-    /// Linear red, green, blue, each from 0 to 1.
-    #[schemars(inner(range(min = 0, max = 1)))]
-    pub color: [f64; 3],
-    /// Extinction per world unit (per mm for a scan).
-    #[schemars(range(min = 0, max = 1e6))]
-    pub opacity_per_unit: f64,
-}
 
 /// A valid transfer function for one volume.
 #[derive(Debug, Clone, PartialEq)]

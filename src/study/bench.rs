@@ -7,11 +7,11 @@ use tokio::runtime::Handle;
 
 use crate::config::{DeviceArgs, Limits};
 use crate::device::DeviceInfo;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::film::{Film, SURE};
-use crate::job::{Engine, Job, State};
-use crate::plan::{Calibrations, Plan, Planner};
-use crate::scene::Scene;
+use crate::job::Job;
+use crate::plan::Plan;
+use crate::service::Service;
 use crate::volume::{RawQuery, Store};
 
 /// What of a finished render is compared with a truth.
@@ -64,28 +64,23 @@ impl Run {
     }
 }
 
-/// An engine and a store of this process.
+/// A service of this process.
 pub struct Bench {
-    engine: Engine,
-    store: Store,
-    limits: Limits,
+    service: Service,
     handle: Handle,
     device: Arc<DeviceInfo>,
-    calibrations: Calibrations,
 }
 
 impl Bench {
-    /// Starts the engine. Must be called on a thread of a tokio runtime that may block.
+    /// Starts the service. Must be called on a thread of a tokio runtime that may block.
     ///
     /// # Errors
     /// [`Error::Internal`] when the device or the folder cannot be used.
     pub fn new(args: &DeviceArgs, limits: Limits) -> Result<Self> {
         let handle = Handle::current();
-        let store = Store::open(&args.data_dir().join("volumes"), limits.store())?;
-        let engine = Engine::start(args.device_config(), limits.clone())?;
-        let device = handle.block_on(engine.ready())?;
-        let calibrations = Calibrations::kept_in(&args.data_dir());
-        Ok(Self { engine, store, limits, handle, device, calibrations })
+        let service = Service::start(args.device_config(), &args.data_dir(), limits)?;
+        let device = handle.block_on(service.engine().ready())?;
+        Ok(Self { service, handle, device })
     }
 
     /// What the device says of itself.
@@ -95,7 +90,7 @@ impl Bench {
 
     /// The volumes.
     pub fn store(&self) -> &Store {
-        &self.store
+        self.service.store()
     }
 
     /// Runs a request to its end.
@@ -103,15 +98,7 @@ impl Bench {
     /// # Errors
     /// Those of the request, or [`Error::Internal`] when it fails.
     pub fn finish(&self, request: &Value) -> Result<Arc<Job>> {
-        let scene = Scene::from_json(request, &self.store, &self.limits)?;
-        let job = self.engine.submit(self.engine.reserve()?, request.clone(), scene);
-        let mut updates = job.watch();
-        let ended = self.handle.block_on(updates.wait_for(|u| u.state.is_terminal()));
-        ended.map_err(Error::internal)?;
-        match job.state() {
-            State::Done => Ok(job),
-            _ => Err(Error::internal(format!("a render of the study failed: {}", job.resource()["failure"]))),
-        }
+        self.handle.block_on(self.service.submit_and_wait(request.clone()))
     }
 
     /// The film of a finished request.
@@ -119,11 +106,7 @@ impl Bench {
     /// # Errors
     /// [`Error::NotFound`] where it is not kept any more.
     pub fn film(&self, job: &Arc<Job>) -> Result<Arc<Film>> {
-        self.handle.block_on(self.engine.film(job))
-    }
-
-    fn planner(&self) -> Planner<'_> {
-        Planner { engine: &self.engine, store: &self.store, limits: &self.limits, calibrations: &self.calibrations }
+        self.handle.block_on(self.service.engine().film(job))
     }
 
     /// Plans a request.
@@ -131,7 +114,7 @@ impl Bench {
     /// # Errors
     /// Those of the planner.
     pub fn plan(&self, request: &Value) -> Result<Plan> {
-        self.handle.block_on(self.planner().plan(request))
+        self.handle.block_on(self.service.planner().plan(request))
     }
 
     /// Every setting that the planner could have chosen for a request, in words and as a request; the first is the reference.
@@ -139,7 +122,7 @@ impl Bench {
     /// # Errors
     /// Those of the request.
     pub fn settings(&self, request: &Value) -> Result<Vec<(String, Value)>> {
-        self.handle.block_on(self.planner().settings(request))
+        self.handle.block_on(self.service.planner().settings(request))
     }
 
     /// Runs a request and reads from it.
@@ -186,7 +169,7 @@ impl Bench {
             spacing: Some(spacing.map(|s| s.to_string()).join(",")),
             endian: None,
         };
-        Ok(json!({"id": self.store.insert(bytes, "study", query.parse()?)?.1}))
+        Ok(json!({"id": self.service.store().insert(bytes, "study", query.parse()?)?.1}))
     }
 }
 

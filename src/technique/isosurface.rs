@@ -48,7 +48,8 @@ pub const TECHNIQUE: Technique = Technique {
     schema: request::schema_of::<Parameters>,
     example,
     source: plan::source,
-    kind: Kind::View(parse),
+    shares: &[],
+    kind: Kind::View { parse, complete: "isosurface", calibration: Some(super::smoke) },
 };
 
 device_struct! {

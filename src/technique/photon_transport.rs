@@ -43,6 +43,7 @@ mod layers;
 mod medium;
 mod parameters;
 mod plan;
+mod process;
 mod report;
 mod source;
 mod tracking;
@@ -52,20 +53,21 @@ use std::sync::Arc;
 use glam::{DAffine3, DMat3, DVec3};
 use serde_json::{Value, json};
 
-use super::{Field, FieldPlan, FieldResult, Kind, Technique};
+use super::{Field, Kind, Process, Technique, Work};
+use crate::device::Device;
 use crate::device::enums::{DeviceEnum, PhaseKind};
 use crate::device::program::{Source, Variant};
 use crate::device::structs::DeviceStruct;
 use crate::error::{Error, Result};
 use crate::request;
 use crate::scene::camera::Framing;
-use crate::volume::{NewVolume, Store, Volume, Voxels};
+use crate::volume::{NewVolume, Store, Voxels};
 use device::{BoundaryKind, LedgerEntry, Media, MediumNumber, SourceKind, Tally};
 pub use device::{FieldPass, PhotonTransport};
 use geometry::Geometry;
 use parameters::Parameters;
+use process::{LOOKS_ON_THE_WAY, Run};
 pub use report::FRACTIONS;
-use report::Ledgers;
 use tracking::Tracking;
 
 /// The technique's line in the list.
@@ -75,7 +77,11 @@ pub const TECHNIQUE: Technique = Technique {
     schema: request::schema_of::<Parameters>,
     example,
     source,
-    kind: Kind::Field(parse),
+    shares: &[],
+    kind: Kind::Field {
+        parse,
+        work: Work { of: "photons", most: |limits| limits.max_photons, first: 20_000, looks: LOOKS_ON_THE_WAY },
+    },
 };
 
 /// `FIXED_ONE` of the kernel: sums are in units of 2^-30.
@@ -107,6 +113,7 @@ fn source() -> Source {
 }
 
 /// A simulation: the request with everything resolved.
+#[derive(Clone)]
 struct Simulation {
     parameters: Parameters,
     geometry: Geometry,
@@ -121,6 +128,10 @@ struct Simulation {
 }
 
 fn parse(parameters: &Value, at: &str, store: &Store) -> Result<Arc<dyn Field>> {
+    Ok(Arc::new(Arc::new(simulation(parameters, at, store)?)))
+}
+
+fn simulation(parameters: &Value, at: &str, store: &Store) -> Result<Simulation> {
     let p: Parameters = request::parse(parameters, (TECHNIQUE.schema)(), at)?;
     let geometry = Geometry::new(&p, store, at)?;
     let source = p.source.resolve(geometry.size_mm, geometry.chamber, &format!("{at}/source"))?;
@@ -181,10 +192,10 @@ fn parse(parameters: &Value, at: &str, store: &Store) -> Result<Arc<dyn Field>> 
     };
     // Here, not on the device's thread.
     simulation.clearance();
-    Ok(Arc::new(simulation))
+    Ok(simulation)
 }
 
-impl Field for Simulation {
+impl Field for Arc<Simulation> {
     fn framing(&self) -> Framing {
         let spacing = DVec3::from(self.spacing_mm());
         let translation = -0.5 * DVec3::from(self.geometry.size_mm);
@@ -192,19 +203,33 @@ impl Field for Simulation {
         Framing::new(&world_from_index, self.geometry.dims, false)
     }
 
-    fn seed(&self) -> u64 {
-        self.parameters.seed
+    fn kernels(&self) -> Result<Vec<Variant>> {
+        Ok(vec![self.variant()?])
     }
 
-    fn plan(&self) -> Result<FieldPlan> {
-        self.device_plan()
+    fn reasons(&self) -> Vec<String> {
+        self.reasons.clone()
     }
 
-    fn finish(&self, grid: &[u64], ledgers: &[Vec<u64>], histories: u64) -> Result<FieldResult> {
+    fn with(&self, work: u64, seed: u64) -> Arc<dyn Field> {
+        let mut other = Simulation::clone(self);
+        other.parameters.photons = work;
+        other.parameters.seed ^= seed;
+        Arc::new(Arc::new(other))
+    }
+
+    fn begin(&self, device: &mut Device) -> Result<Box<dyn Process>> {
+        Ok(Box::new(Run::new(device, self.clone())?))
+    }
+}
+
+impl Simulation {
+    /// The grid after so many photons, per photon, from its sums.
+    fn grid(&self, sums: &[u64], photons: u64) -> NewVolume {
         let [sx, sy, sz] = self.spacing_mm();
-        let scale = 1.0 / (self.deposit_scale() * FIXED_ONE * histories as f64 * sx * sy * sz);
-        let values = grid.iter().map(|&sum| (sum as i64 as f64 * scale) as f32).collect();
-        let volume = Volume::new(NewVolume {
+        let scale = 1.0 / (self.deposit_scale() * FIXED_ONE * photons as f64 * sx * sy * sz);
+        let values = sums.iter().map(|&sum| (sum as i64 as f64 * scale) as f32).collect();
+        NewVolume {
             dims: self.geometry.dims,
             spacing: self.spacing_mm(),
             linear: None,
@@ -216,7 +241,6 @@ impl Field for Simulation {
             file_affine: None,
             unit: "mm".into(),
             notes: Vec::new(),
-        })?;
-        Ok(FieldResult { volume, result: self.report(&Ledgers::new(ledgers, histories), grid) })
+        }
     }
 }

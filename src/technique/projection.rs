@@ -54,7 +54,8 @@ pub const TECHNIQUE: Technique = Technique {
     schema: request::schema_of::<Parameters>,
     example,
     source: plan::source,
-    kind: Kind::View(parse),
+    shares: &[],
+    kind: Kind::View { parse, complete: "projection", calibration: None },
 };
 
 device_struct! {

@@ -4,6 +4,7 @@ mod device;
 mod kernels;
 mod parameters;
 mod plan;
+mod settings;
 
 use serde_json::Value;
 
@@ -12,6 +13,7 @@ pub use device::Scattering;
 pub(super) use kernels::source;
 pub(super) use parameters::Parameters;
 pub(super) use plan::Scatterer;
+pub(super) use settings::NOT_OF_ONCE;
 
 /// The schema of the parameters without those that are not a technique's own, and without phase functions that are not of light.
 pub(super) fn schema(without: &[&str]) -> &'static Value {

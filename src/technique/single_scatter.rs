@@ -37,11 +37,12 @@ pub const TECHNIQUE: Technique = Technique {
     schema,
     example,
     source,
-    kind: Kind::View(parse),
+    shares: &["medium", "lights"],
+    kind: Kind::View { parse, complete: "volume_path", calibration: Some(super::smoke) },
 };
 
 fn schema() -> &'static Value {
-    scattering::schema(&["max_scatterings", "next_event", "roulette_threshold"])
+    scattering::schema(&scattering::NOT_OF_ONCE)
 }
 
 /// A request that works as it is.

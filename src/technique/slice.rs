@@ -47,7 +47,8 @@ pub const TECHNIQUE: Technique = Technique {
     schema: request::schema_of::<Parameters>,
     example,
     source: plan::source,
-    kind: Kind::View(parse),
+    shares: &[],
+    kind: Kind::View { parse, complete: "slice", calibration: None },
 };
 
 device_struct! {

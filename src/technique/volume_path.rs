@@ -40,7 +40,8 @@ pub const TECHNIQUE: Technique = Technique {
     schema,
     example,
     source,
-    kind: Kind::View(parse),
+    shares: &["medium", "lights"],
+    kind: Kind::View { parse, complete: "volume_path", calibration: Some(super::smoke) },
 };
 
 fn schema() -> &'static Value {

@@ -3,7 +3,7 @@
 //! The header is parsed by the `nifti` crate; the voxels are not, since that crate trusts the header's sizes.
 
 use super::inflate::Source;
-use super::read::{VolumeLimits, checked_count};
+use super::limits::{VolumeLimits, checked_count};
 use super::samples::{Endian, RawType, decode};
 use super::{NewVolume, SPACING_RANGE, Volume, checked_axes};
 use crate::error::{Error, Result};

@@ -1,8 +1,8 @@
 //! NRRD with its data attached, raw or gzip: <https://teem.sourceforge.net/nrrd/format.html>.
 
 use super::inflate::Source;
+use super::limits::{VolumeLimits, checked_count};
 use super::nrrd_header::{Header, vector};
-use super::read::{VolumeLimits, checked_count};
 use super::samples::{Endian, RawType, decode};
 use super::{NewVolume, SPACING_RANGE, Volume, checked_axes};
 use crate::error::{Error, Result};

@@ -1,7 +1,7 @@
 //! Bare voxels, described by query parameters: `?dims=181,217,181&type=u8&spacing=1,1,1&endian=little`.
 
 use super::inflate::Source;
-use super::read::{VolumeLimits, checked_count};
+use super::limits::{VolumeLimits, checked_count};
 use super::samples::{Endian, RawType, decode};
 use super::{NewVolume, SPACING_RANGE, Volume};
 use crate::error::{Error, Result, Violation};

@@ -5,9 +5,11 @@ use std::sync::{Arc, Mutex, OnceLock};
 use clap::Parser;
 use cloudchamber::config::Limits;
 use cloudchamber::device::{self, DeviceConfig, DeviceInfo};
+use cloudchamber::error::Error;
 use cloudchamber::film::{ErrorEstimate, Film};
-use cloudchamber::job::{Engine, Job, State};
-use cloudchamber::scene::Scene;
+use cloudchamber::job::Job;
+use cloudchamber::render::Scene;
+use cloudchamber::service::Service;
 use cloudchamber::volume::Store;
 use serde_json::{Value, json};
 
@@ -17,11 +19,9 @@ struct Flags {
     limits: Limits,
 }
 
-/// An engine with a store of its own.
+/// A service with a store of its own.
 pub struct House {
-    pub engine: Engine,
-    pub store: Store,
-    pub limits: Limits,
+    pub service: Service,
     runtime: tokio::runtime::Runtime,
     _data: tempfile::TempDir,
 }
@@ -34,12 +34,21 @@ impl House {
         device::keep_compiled_kernels_in(&super::kernel_cache()).unwrap();
         let data = tempfile::tempdir().unwrap();
         let limits = Flags::parse_from(["test", "--keep-film-bytes", "1000000000"]).limits;
-        let store = Store::open(&data.path().join("volumes"), limits.store()).unwrap();
         let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().unwrap();
         let config = DeviceConfig { lanes, kernels: super::kernels(), ..DeviceConfig::pocl() };
-        let engine = runtime.block_on(async { Engine::start(config, limits.clone()) }).unwrap();
-        runtime.block_on(engine.ready()).unwrap();
-        Self { engine, store, limits, runtime, _data: data }
+        let service = runtime.block_on(async { Service::start(config, data.path(), limits) }).unwrap();
+        runtime.block_on(service.engine().ready()).unwrap();
+        Self { service, runtime, _data: data }
+    }
+
+    /// The stored volumes.
+    pub fn store(&self) -> &Store {
+        self.service.store()
+    }
+
+    /// The scene of a request, or why it is refused.
+    pub fn scene(&self, request: &Value) -> Result<Scene, Error> {
+        self.service.scene(request)
     }
 
     /// The shared one, with the device's own lanes.
@@ -50,17 +59,13 @@ impl House {
 
     /// What its device says of itself.
     pub fn info(&self) -> Arc<DeviceInfo> {
-        self.runtime.block_on(self.engine.ready()).unwrap()
+        self.runtime.block_on(self.service.engine().ready()).unwrap()
     }
 
     /// Runs a request to its end.
     pub fn finish(&self, request: &Value) -> Arc<Job> {
-        let scene = Scene::from_json(request, &self.store, &self.limits).unwrap_or_else(|e| panic!("{request}: {e}"));
-        let job = self.engine.submit(self.engine.reserve().unwrap(), request.clone(), scene);
-        let mut updates = job.watch();
-        self.runtime.block_on(updates.wait_for(|u| u.state.is_terminal())).unwrap();
-        assert_eq!(job.state(), State::Done, "{}", job.resource());
-        job
+        let done = self.runtime.block_on(self.service.submit_and_wait(request.clone()));
+        done.unwrap_or_else(|e| panic!("{request}: {e}"))
     }
 
     /// The film of a finished request.
@@ -71,7 +76,7 @@ impl House {
 
     /// The film of a job.
     pub fn film_of(&self, job: &Arc<Job>) -> Arc<Film> {
-        self.runtime.block_on(self.engine.film(job)).unwrap()
+        self.runtime.block_on(self.service.engine().film(job)).unwrap()
     }
 
     /// The final frame of a request.
@@ -102,12 +107,12 @@ impl House {
             spacing: Some(dims.map(|n| (2.0 / n as f64).to_string()).join(",")),
             endian: None,
         };
-        let (_, id, _) = self.store.insert(bytes, "test", query.parse().unwrap()).unwrap();
+        let (_, id, _) = self.store().insert(bytes, "test", query.parse().unwrap()).unwrap();
         json!({"id": id})
     }
 
     /// Puts a volume file in the store and returns what goes under `volume`.
     pub fn file(&self, bytes: Vec<u8>) -> Value {
-        json!({"id": self.store.insert(bytes, "file", None).unwrap().1})
+        json!({"id": self.store().insert(bytes, "file", None).unwrap().1})
     }
 }

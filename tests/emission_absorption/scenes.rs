@@ -1,7 +1,6 @@
 //! Clipping, backgrounds, labels, presets, odd volumes and what cannot be had together.
 
 use cloudchamber::error::Error;
-use cloudchamber::scene::Scene;
 use cloudchamber::volume::RawQuery;
 use serde_json::{Value, json};
 
@@ -26,7 +25,7 @@ fn white(sigma: f64) -> Value {
 fn raw(dims: &str, kind: &str, bytes: Vec<u8>) -> Value {
     let text = |s: &str| Some(s.to_owned());
     let query = RawQuery { dims: text(dims), r#type: text(kind), spacing: None, endian: None };
-    json!({"id": House::shared().store.insert(bytes, "test", query.parse().unwrap()).unwrap().1})
+    json!({"id": House::shared().store().insert(bytes, "test", query.parse().unwrap()).unwrap().1})
 }
 
 fn alphas(request: &Value) -> Vec<f32> {
@@ -221,7 +220,7 @@ fn what_cannot_be_had_together_names_its_field() {
         if !clip.is_null() {
             request["clip"] = clip;
         }
-        match Scene::from_json(&request, &house.store, &house.limits) {
+        match house.scene(&request) {
             Err(Error::Invalid(violations)) => assert_eq!(violations[0].pointer, pointer, "{own}"),
             other => panic!("{own}: {:?}", other.err()),
         }

@@ -150,7 +150,7 @@ fn a_beam_that_misses_is_refused_and_one_that_half_misses_is_counted() {
         json!({"position_mm": [1, 1, 2], "direction": [0, 0, 1]}),
         json!({"type": "disk", "radius_mm": 1, "position_mm": [5, 1, -1]}),
     ] {
-        let refused = cloudchamber::scene::Scene::from_json(&scene(source.clone()), &house.store, &house.limits).err();
+        let refused = house.scene(&scene(source.clone())).err();
         let said = refused.map(|e| e.to_string()).unwrap_or_default();
         assert!(said.contains("misses the box"), "{source}: {said}");
     }

@@ -182,7 +182,7 @@ fn what_does_not_go_with_gammas_names_its_field() {
     ];
     for (parameters, field) in cases {
         let request = super::run::request(&parameters);
-        let refused = cloudchamber::scene::Scene::from_json(&request, &house.store, &house.limits).err();
+        let refused = house.scene(&request).err();
         let Some(cloudchamber::error::Error::Invalid(violations)) = refused else { panic!("{parameters} is accepted") };
         assert!(
             violations.iter().any(|v| v.pointer == format!("/volume/photon_transport/{field}")),

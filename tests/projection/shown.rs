@@ -1,7 +1,6 @@
 //! Window, level and colour maps; what is refused; the manual's example.
 
 use cloudchamber::error::Error;
-use cloudchamber::scene::Scene;
 use cloudchamber::technique::projection;
 use serde_json::{Value, json};
 
@@ -64,7 +63,7 @@ fn what_makes_no_sense_is_refused_by_its_name() {
         (json!({"thickness": 1}), "/projection/thickness"),
     ] {
         let body = json!({"technique": "projection", "volume": {"builtin": "sphere", "resolution": 8}, "projection": parameters});
-        match Scene::from_json(&body, &house.store, &house.limits) {
+        match house.scene(&body) {
             Err(Error::Invalid(violations)) => assert_eq!(violations[0].pointer, pointer, "{body}"),
             other => panic!("{body}: {:?}", other.err()),
         }
@@ -104,7 +103,7 @@ fn a_greatest_value_is_shown_from_words_and_written_from_floats() {
     let [(words, shown), (no_words, values)] = [of(json!({})), of(json!({"output": "value"}))];
     assert!(words && !no_words);
     // Grey is the value's part of the range in sRGB, and the film has linear light.
-    let [low, high] = house.store.get(volume["id"].as_str().unwrap()).unwrap().range();
+    let [low, high] = house.store().get(volume["id"].as_str().unwrap()).unwrap().range();
     let pixels = shown.main.mean.chunks_exact(4).zip(values.main.mean.chunks_exact(4));
     for (grey, value) in pixels.filter(|(grey, _)| grey[3] == 1.0) {
         let part = (f64::from(value[0]) - low) / (high - low);

@@ -1,7 +1,6 @@
 //! What a request may ask and may not; the same request twice; the manual's example.
 
 use cloudchamber::error::Error;
-use cloudchamber::scene::Scene;
 use cloudchamber::technique::slice;
 use glam::dvec3;
 use serde_json::json;
@@ -27,7 +26,7 @@ fn what_makes_no_sense_is_refused_by_its_name() {
         (json!({"mode": "sum"}), "/slice/mode"),
     ] {
         let body = json!({"technique": "slice", "volume": {"builtin": "sphere", "resolution": 8}, "slice": parameters});
-        match Scene::from_json(&body, &house.store, &house.limits) {
+        match house.scene(&body) {
             Err(Error::Invalid(violations)) => assert_eq!(violations[0].pointer, pointer, "{body}"),
             other => panic!("{body}: {:?}", other.err()),
         }

@@ -132,10 +132,10 @@ async fn the_device_is_free_soon_after_a_cancel() {
         let ended = api.get_json(&path).await;
         assert_eq!((&ended["state"], &ended["stopped_by"]), (&json!("cancelled"), &json!(null)));
     }
-    // The next render's own account of how long it waited for the device. The promise is 100 ms; the median of five on a
-    // machine that does other things gets five times that.
-    waits.sort_by(f64::total_cmp);
-    assert!(waits[2] < 500.0, "waited {waits:?} ms");
+    // The next render's own account of how long it waited for the device: 100 ms are promised. Whoever else works on this machine may make
+    // some of the five late; a device that is held makes all of them late.
+    let least = waits.iter().copied().fold(f64::INFINITY, f64::min);
+    assert!(least < 100.0, "waited {waits:?} ms");
 }
 
 /// Large fields are made on the device's thread too: their preparation must not hold up others.

@@ -127,7 +127,7 @@ fn a_field_gets_the_photons_that_its_picture_needs_and_no_more() {
                 "image": {"width": 96, "height": 72}, "budget": {"max_error": error}});
             request.as_object_mut().unwrap().extend(view.as_object().unwrap().clone());
             let found = plan(bench, &request);
-            let photons = found.photons.unwrap();
+            let photons = found.work.unwrap().amount;
             assert_eq!(found.request["volume"]["photon_transport"]["photons"], photons, "{name}");
             let truth = Truth::of(bench, &request, 128, Some(16 * photons));
             // A field may be a lucky one: what is promised of nineteen in twenty is more than true of their mean square.
@@ -145,7 +145,7 @@ fn a_field_gets_the_photons_that_its_picture_needs_and_no_more() {
             assert!(enough <= error && fewer > error, "{name}: {enough}, and {fewer} with a sixteenth of {photons}");
             request["volume"]["photon_transport"]["photons"] = json!(5000);
             let kept = plan(bench, &request);
-            assert_eq!(kept.photons, Some(5000), "{name}: what is said is kept");
+            assert_eq!(kept.work.map(|w| w.amount), Some(5000), "{name}: what is said is kept");
             let nearest = kept.reasons.iter().any(|reason| reason.contains("comes nearest"));
             assert!(kept.samples < 1000 && nearest, "{name}: {:?}", kept.reasons);
         }

@@ -1,6 +1,8 @@
 //! The plan of `emission_absorption`: its kernels, parameters and tables.
 
-use serde_json::Value;
+use std::sync::Arc;
+
+use serde_json::{Value, json};
 
 use super::pieces::pieces;
 use super::{EmissionAbsorption, Parameters, TECHNIQUE, regions};
@@ -11,8 +13,9 @@ use crate::scene::camera::Camera;
 use crate::scene::interpolation::Interpolation;
 use crate::scene::presets;
 use crate::scene::transfer::{TABLE_SIZE, TransferFunction, pack};
+use crate::technique::stepping::{Way, stepping};
 use crate::technique::steps::coarse_step;
-use crate::technique::{CellUse, View, ViewPlan, view_text};
+use crate::technique::{CellUse, Open, Settings, View, ViewPlan, view_text};
 use crate::volume::{Volume, VoxelType};
 
 type Features = [(&'static str, i32); 5];
@@ -115,6 +118,23 @@ impl View for Parameters {
         coarse_step(self.step_voxels).into_iter().collect()
     }
 
+    fn settings(&self, volume: &Volume, open: &Open<'_>) -> Option<Settings> {
+        let mut ways = vec![Way::as_given(self)];
+        if open.leaves("pre_integrated") {
+            let integrated = Self { pre_integrated: true, ..self.clone() };
+            let possible = integrated.check_together("").is_ok();
+            let change = Some(("pre_integrated", json!(true)));
+            ways.extend(possible.then_some(Way { words: ", pre-integrated", change, parameters: integrated }));
+        }
+        // There is no gradient for shading to show.
+        let flat = volume.non_finite() == 0 && volume.range()[0] == volume.range()[1];
+        if flat && self.shading {
+            let unshaded = Self { shading: false, ..self.clone() };
+            ways.push(Way { words: ", unshaded", change: Some(("shading", json!(false))), parameters: unshaded });
+        }
+        stepping(TECHNIQUE.name, open, &ways, |p, step| Arc::new(Self { step_voxels: step, ..p.clone() }))
+    }
+
     fn steepest_slope(&self, volume: &Volume) -> Option<f64> {
         let plain = self.regions.is_none() && !self.labels();
         let function = plain.then(|| self.transfer_function(volume).ok()).flatten();
@@ -197,7 +217,7 @@ impl View for Parameters {
         })
     }
 
-    fn look(&self, camera: &Camera, view: &mut DeviceView) {
+    fn set_shared(&self, camera: &Camera, view: &mut DeviceView) {
         if !self.jitter {
             (view.jittered, view.place) = (0, 0.5);
         }

@@ -1,5 +1,7 @@
 //! The plan of `isosurface`: its kernels, parameters and tables.
 
+use std::sync::Arc;
+
 use serde_json::{Value, json};
 
 use super::surfaces::{self, Surface};
@@ -11,8 +13,9 @@ use crate::scene;
 use crate::scene::camera::Camera;
 use crate::scene::interpolation::Interpolation;
 use crate::scene::light::LightRequest;
+use crate::technique::stepping::{Way, stepping};
 use crate::technique::steps::coarse_step;
-use crate::technique::{CellUse, View, ViewPlan, view_text};
+use crate::technique::{CellUse, Open, Settings, View, ViewPlan, view_text};
 use crate::volume::{Volume, VoxelType};
 
 /// The tolerance of a crossing, in voxels.
@@ -92,6 +95,11 @@ impl Parameters {
 }
 
 impl View for Parameters {
+    fn settings(&self, _: &Volume, open: &Open<'_>) -> Option<Settings> {
+        let ways = [Way::as_given(self)];
+        stepping(TECHNIQUE.name, open, &ways, |p, step| Arc::new(Self { step_voxels: step, ..p.clone() }))
+    }
+
     fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
         let surfaces = self.surfaces(volume);
         let wanted = features(self.interpolation(), self.layered(&surfaces));
@@ -136,7 +144,7 @@ impl View for Parameters {
         Ok(bytemuck::bytes_of(&device).to_vec())
     }
 
-    fn look(&self, camera: &Camera, view: &mut DeviceView) {
+    fn set_shared(&self, camera: &Camera, view: &mut DeviceView) {
         // Surfaces are looked for from one end of a step to the other, not at a place within it.
         (view.jittered, view.place) = (0, 0.0);
         let shadowed = self.ambient_occlusion.is_some();

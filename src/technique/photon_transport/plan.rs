@@ -11,7 +11,6 @@ use super::{PhotonTransport, Simulation, TECHNIQUE, medium};
 use crate::device::enums::DeviceEnum;
 use crate::device::program::{Variant, listed};
 use crate::error::Result;
-use crate::technique::FieldPlan;
 
 /// Light in a vacuum, mm per ns.
 const LIGHT_MM_PER_NS: f64 = 299.792_458;
@@ -53,6 +52,20 @@ pub(super) static FEATURES: [Features; 20] = {
         gamma(Density),
     ]
 };
+
+/// What the kernel is run with: data, no device needed to make it.
+pub(super) struct DevicePlan {
+    /// The kernel variant.
+    pub variant: Variant,
+    /// The kernel's own parameters, as the bytes of its device struct; a launch has a `FieldPass` beside it.
+    pub parameters: Vec<u8>,
+    /// Read-only data, such as the extinction of every voxel.
+    pub table: Vec<f32>,
+    /// Cells of the grid of 64-bit sums.
+    pub cells: usize,
+    /// 64-bit sums beside the grid: the energy ledger.
+    pub ledger: usize,
+}
 
 fn permitted(wanted: Features) -> Result<&'static Features> {
     listed(TECHNIQUE.name, &FEATURES, wanted)
@@ -155,7 +168,11 @@ impl Simulation {
         }
     }
 
-    pub(super) fn device_plan(&self) -> Result<FieldPlan> {
+    /// What the kernel is run with.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Internal`] for a combination of features that is not listed.
+    pub(super) fn device_plan(&self) -> Result<DevicePlan> {
         let (p, g) = (&self.parameters, &self.geometry);
         let mut table = medium::table(&g.media);
         let spacing = self.spacing_mm();
@@ -225,15 +242,18 @@ impl Simulation {
             device.at_cosines = append(&mut table, histogram.angle_edges_deg.iter().map(cosine));
             bins = 2 * device.radius_bins as usize * device.angle_bins as usize;
         }
-        Ok(FieldPlan {
-            variant: Variant::new(TECHNIQUE.name, None, features(g, self.tracking)?),
+        Ok(DevicePlan {
+            variant: self.variant()?,
             parameters: bytemuck::bytes_of(&device).to_vec(),
             table,
             cells: g.dims.iter().product(),
             ledger: LedgerEntry::LENGTH + bins,
-            histories: p.photons,
-            reasons: self.reasons.clone(),
         })
+    }
+
+    /// The kernel variant.
+    pub(super) fn variant(&self) -> Result<Variant> {
+        Ok(Variant::new(TECHNIQUE.name, None, features(&self.geometry, self.tracking)?))
     }
 
     /// In a thin box only light that total reflection keeps in takes many steps: without absorption it would never end.

@@ -127,7 +127,38 @@ impl Simulation {
 
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
+
+    use super::super::simulation;
     use super::*;
+    use crate::volume::{Store, StoreLimits, VolumeLimits};
+
+    #[test]
+    fn sums_near_the_end_of_their_range_are_flagged() -> crate::error::Result<()> {
+        let folder = std::env::temp_dir().join(format!("cloudchamber-report-{}", std::process::id()));
+        let store = Store::open(
+            &folder,
+            StoreLimits { volume: VolumeLimits::default(), max_store_bytes: 0, max_resident_bytes: 0 },
+        )?;
+        let of = simulation(&json!({"photons": 1000, "grid": [4, 4, 4]}), "/volume/photon_transport", &store)?;
+        let plan = of.device_plan()?;
+        let flags = |grid_sum: u64, ledger_sum: u64| {
+            let (mut grid, mut ledger) = (vec![0; plan.cells], vec![0; plan.ledger]);
+            (grid[5], ledger[6]) = (grid_sum, ledger_sum);
+            let result = of.report(&Ledgers::new(&[ledger.clone(), ledger], 1000), &grid);
+            let warned =
+                result["warnings"].as_array().is_some_and(|all| all.iter().any(|w| w["code"] == "sums_overflow"));
+            assert_eq!(result["overflow"], warned);
+            warned
+        };
+        assert!(!flags(1 << 60, 1 << 59), "sums with room to spare");
+        assert!(flags((1 << 61) + 1, 0), "a voxel's sum");
+        assert!(flags(0, (1 << 60) + 1), "the ledger's sum of two batches");
+        // Wrapped round: the sum of a positive 2^63 is negative.
+        assert!(flags(1 << 63, 0), "a sum that has wrapped round");
+        drop(std::fs::remove_dir_all(folder));
+        Ok(())
+    }
 
     #[test]
     fn fractions_are_the_first_entries_of_the_ledger() {

@@ -1,5 +1,7 @@
 //! The plan of `projection`: its kernels, parameters and tables.
 
+use std::sync::Arc;
+
 use serde_json::Value;
 
 use super::{DeviceMode, Mode, Parameters, Projection, TECHNIQUE};
@@ -12,8 +14,9 @@ use crate::scene::camera::Camera;
 use crate::scene::interpolation::Interpolation;
 use crate::scene::presets::is_hounsfield;
 use crate::scene::window::{Output, Window};
+use crate::technique::stepping::{Way, stepping};
 use crate::technique::steps::coarse_step;
-use crate::technique::{CellUse, View, ViewPlan, view_text};
+use crate::technique::{CellUse, Open, Settings, View, ViewPlan, view_text};
 use crate::volume::{Volume, VoxelType};
 
 /// The optical depth of a bright ray in an X-ray by default: an eighth gets through.
@@ -102,6 +105,11 @@ impl Parameters {
 }
 
 impl View for Parameters {
+    fn settings(&self, _: &Volume, open: &Open<'_>) -> Option<Settings> {
+        let ways = [Way::as_given(self)];
+        stepping(TECHNIQUE.name, open, &ways, |p, step| Arc::new(Self { step_voxels: step, ..p.clone() }))
+    }
+
     fn warnings(&self, _: &Volume) -> Vec<Value> {
         coarse_step(self.step_voxels).filter(|_| !self.walked()).into_iter().collect()
     }
@@ -159,7 +167,7 @@ impl View for Parameters {
         Ok(self.color_map.table(self.invert))
     }
 
-    fn look(&self, _camera: &Camera, view: &mut DeviceView) {
+    fn set_shared(&self, _camera: &Camera, view: &mut DeviceView) {
         view.jittered = 0;
     }
 }

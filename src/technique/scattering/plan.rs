@@ -14,8 +14,9 @@ use crate::scene::depth::greatest_along_axes;
 use crate::scene::interpolation::Interpolation;
 use crate::scene::lights::Lights;
 use crate::technique::majorant::{Tracking, march_bias};
+use crate::technique::optics::Optics;
 use crate::technique::slab::missing;
-use crate::technique::{CellUse, Random, View, ViewPlan};
+use crate::technique::{CellUse, Open, Random, Settings, View, ViewPlan};
 use crate::volume::Volume;
 
 /// Steps of less than this part of a volume's voxels along an axis are lost in single precision.
@@ -28,9 +29,9 @@ const SCATTERINGS_MISSING: f64 = 0.01;
 
 /// A scattering view with valid parameters.
 pub(in crate::technique) struct Scatterer {
-    kernel: &'static str,
-    parameters: Parameters,
-    lights: Lights,
+    pub(super) kernel: &'static str,
+    pub(super) parameters: Parameters,
+    pub(super) lights: Lights,
 }
 
 impl Scatterer {
@@ -158,6 +159,14 @@ impl Scatterer {
 }
 
 impl View for Scatterer {
+    fn settings(&self, volume: &Volume, open: &Open<'_>) -> Option<Settings> {
+        Some(self.settings_of(volume, open))
+    }
+
+    fn optics(&self, volume: &Volume) -> Option<Optics> {
+        Some(self.optics_of(volume))
+    }
+
     fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
         self.check_march(volume)?;
         let (features, why) = self.features(volume)?;

@@ -107,7 +107,7 @@ impl View for Parameters {
         Ok(self.color_map.table(self.invert))
     }
 
-    fn look(&self, _camera: &Camera, view: &mut DeviceView) {
+    fn set_shared(&self, _camera: &Camera, view: &mut DeviceView) {
         view.jittered = 0;
     }
 }

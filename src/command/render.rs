@@ -1,0 +1,125 @@
+//! `render`: a scene to a picture, here or by a server.
+
+use std::path::{Path, PathBuf};
+
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::{Value, json};
+
+use super::client::Client;
+use crate::config::{DeviceArgs, Limits};
+use crate::error::{Error, Result};
+use crate::job::State;
+use crate::service::Service;
+
+/// What `render` is told.
+#[derive(clap::Args)]
+pub(super) struct Arguments {
+    /// The scene, or - for standard input
+    scene: PathBuf,
+    /// Where the PNG goes; a name that ends in .exr gets OpenEXR in linear floats
+    #[arg(short, long, default_value = "out.png")]
+    output: PathBuf,
+    /// Volume file to look at, in place of the scene's volume
+    #[arg(long)]
+    volume: Option<PathBuf>,
+    /// Let the server at this URL do it
+    #[arg(long, env = "CLOUDCHAMBER_SERVER")]
+    server: Option<String>,
+    /// Bearer token for that server
+    #[arg(long, env = "CLOUDCHAMBER_TOKEN", hide_env_values = true)]
+    token: Option<String>,
+    #[command(flatten)]
+    pub device: DeviceArgs,
+    #[command(flatten)]
+    limits: Limits,
+}
+
+impl Arguments {
+    fn wants_exr(&self) -> bool {
+        self.output.extension().is_some_and(|e| e == "exr")
+    }
+}
+
+fn read_scene(path: &Path) -> Result<Value> {
+    let text =
+        if path == Path::new("-") { std::io::read_to_string(std::io::stdin()) } else { std::fs::read_to_string(path) };
+    let text = text.map_err(|e| Error::Malformed(format!("{}: {e}", path.display())))?;
+    serde_json::from_str(&text).map_err(|e| Error::Malformed(format!("{}: {e}", path.display())))
+}
+
+fn bar(scene: &Value) -> ProgressBar {
+    let samples = scene.pointer("/budget/samples").and_then(Value::as_u64).unwrap_or(16);
+    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} samples  {msg}  {elapsed}");
+    ProgressBar::new(samples).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
+
+/// Renders a scene and writes its picture.
+///
+/// # Errors
+/// Those of the scene, of its file, and of the server where one is named.
+pub(super) async fn render(args: &Arguments) -> Result<()> {
+    let mut scene = read_scene(&args.scene)?;
+    let (bytes, report) = match &args.server {
+        Some(server) => render_there(args, server, &mut scene).await?,
+        None => render_here(args, &mut scene).await?,
+    };
+    std::fs::write(&args.output, bytes).map_err(|e| Error::internal(format!("{}: {e}", args.output.display())))?;
+    let percent = |v: &Value| v.as_f64().map_or("unknown".into(), |e| format!("{:.3} %", 100.0 * e));
+    let (time, stop) = (&report["timings"]["elapsed_ms"], report["stopped_by"].as_str().unwrap_or("?"));
+    println!(
+        "{}: {} samples, error {}, {time:.0} ms, stopped by {stop}",
+        args.output.display(),
+        report["samples"],
+        percent(&report["error"])
+    );
+    Ok(())
+}
+
+async fn render_there(args: &Arguments, server: &str, scene: &mut Value) -> Result<(Vec<u8>, Value)> {
+    let client = Client::new(server, args.token.clone())?;
+    if let Some(path) = &args.volume {
+        scene["volume"] = json!({"id": client.upload(path).await?});
+    }
+    let bar = bar(scene);
+    let done = client
+        .render(scene, args.wants_exr(), |p| {
+            bar.set_position(p.samples);
+            bar.set_message(p.error.map_or(String::new(), |e| format!("error {:.3} %", 100.0 * e)));
+        })
+        .await;
+    bar.finish();
+    done
+}
+
+/// The same code as the server's, without the server.
+async fn render_here(args: &Arguments, scene: &mut Value) -> Result<(Vec<u8>, Value)> {
+    let service = Service::start(args.device.device_config(), &args.device.data_dir(), args.limits.clone())?;
+    if let Some(path) = &args.volume {
+        let bytes = std::fs::read(path).map_err(|e| Error::Malformed(format!("{}: {e}", path.display())))?;
+        let name = path.file_name().map_or_else(|| "volume".into(), |n| n.to_string_lossy().into_owned());
+        scene["volume"] = json!({"id": service.store().insert(bytes, &name, None)?.1});
+    }
+    service.engine().ready().await?;
+    let job = service.submit(scene.take()).await?;
+    let bar = bar(job.request());
+    let mut updates = job.watch();
+    loop {
+        let update = updates.borrow_and_update().clone();
+        if let Some(frame) = &update.frame {
+            bar.set_position(u64::from(frame.samples));
+            bar.set_message(format!("error {:.3} %", 100.0 * frame.error.total));
+        }
+        match (update.state, update.frame) {
+            (State::Done, Some(last)) => {
+                bar.finish();
+                let exr = args.wants_exr();
+                let bytes = if exr { service.engine().film(&job).await?.exr()? } else { last.png.to_vec() };
+                return Ok((bytes, job.resource()));
+            }
+            (State::Failed | State::Cancelled, _) => {
+                return Err(job.failure().unwrap_or_else(|| Error::internal("the render was cancelled")));
+            }
+            _ => updates.changed().await.map_err(Error::internal)?,
+        }
+    }
+}

@@ -1,0 +1,250 @@
+//! How much work a picture needs of a field that is yet to be computed, such as photons.
+//!
+//! A picture I_N after work N is wrong by e² = F² / N, where the work is random. Fields with seeds of their own, some of N and one of 8 N,
+//! tell F²: |I_N − I_8N|² = F² (1/N + 1/8N). Where the picture is not linear in the field, as where its colours follow the field's range, it
+//! is wrong by more, and by what falls faster: F² has that too. The view's own random part is not in it: the square is the mean over the
+//! pixels of d d′, of two seeds of the view. Often it is of a few bright pixels, as those of a beam, or of one number that all colours
+//! follow: one field would tell little.
+
+use std::sync::Arc;
+
+use serde_json::{Value, json};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use super::Planner;
+use super::found::Found;
+use super::noise::in_common;
+use super::pilot::{PIXELS, SAMPLES};
+use super::reply::FieldAmount;
+use super::run::{Asked, Run, mean, to_its_end};
+use crate::error::{Error, Result};
+use crate::film::Round;
+use crate::render::region::Region;
+use crate::render::{AskedWork, Scene, Subject};
+use crate::volume::Volume;
+
+/// How long the second field is to take, ms.
+const PILOT_MS: f64 = 60.0;
+/// How many of such fields there are, and how many times as much work the last has.
+const FIELDS: usize = 8;
+const MANY: u64 = 8;
+/// Digits of a planned amount of work are kept but for this part of it.
+const ROUNDED: f64 = 0.01;
+/// Of more pixels than these it does not matter how many there are.
+const MOST_FREEDOM: f64 = 1e4;
+
+/// A field as pilots see it.
+pub struct Simulated {
+    asked: AskedWork,
+    most: u64,
+    /// The work of the small ones.
+    few: u64,
+    /// The large one, its work, and what that took, ms.
+    many: Arc<Volume>,
+    work: u64,
+    ms: f64,
+}
+
+/// What is known of a field's work.
+#[derive(Debug, Clone, Copy)]
+pub struct FieldWork {
+    /// What is counted.
+    pub of: &'static str,
+    /// F², relative to the picture's mean, squared.
+    pub squared: f64,
+    /// How much more than F² / N says a picture may be wrong by chance.
+    pub chance: f64,
+    /// Device time besides the work, and of one piece of it, ms.
+    pub ms: [f64; 2],
+    /// How much is asked for, where that is said.
+    pub given: Option<u64>,
+    /// How much is permitted.
+    pub most: u64,
+    /// Pictures on the way.
+    pub looks: u32,
+}
+
+impl Simulated {
+    /// Computes a little of the field that a scene looks at, which tells how much the small fields may have, and the large one.
+    ///
+    /// # Errors
+    /// Those of the renders.
+    pub async fn of(planner: &Planner<'_>, scene: &Scene) -> Result<Self> {
+        let Subject::Field(_, asked) = *scene.subject() else { return Err(Error::internal("there is no field")) };
+        let most = (asked.work.most)(planner.limits);
+        let first = asked.work.first.min(most);
+        let (_, ms) = simulate(planner, scene, [first, 1]).await?;
+        let few = ((PILOT_MS * first as f64 / ms) as u64).clamp(first, (most / MANY).max(first));
+        let work = (MANY * few).min(most);
+        let (many, ms) = simulate(planner, scene, [work, 2]).await?;
+        Ok(Self { asked, most, few, many, work, ms })
+    }
+
+    /// The volume that pilots look at.
+    pub fn volume(&self) -> &Arc<Volume> {
+        &self.many
+    }
+
+    /// Computes the small fields of `scene`, and sees what they do to the picture as the reference shows it.
+    ///
+    /// # Errors
+    /// Those of the renders.
+    pub async fn work(
+        &self,
+        asked: Asked<'_>,
+        scene: &Scene,
+        found: &Found,
+        pixels_per_voxel: f64,
+    ) -> Result<FieldWork> {
+        let (Some(pilot), Some(of_many)) = (found.pilots.first(), &found.reference) else {
+            return Err(Error::internal("a field that no pilot looked at"));
+        };
+        let region = Region::some(PIXELS, [0, 0], asked.image());
+        let [a, b] = last(of_many)?;
+        let (mut apart, mut of_fields, mut ms) = (vec![0.0; of_many[0].pixels], Vec::new(), f64::INFINITY);
+        for seed in 3..3 + FIELDS as u64 {
+            // One at a time: they may be large.
+            let (field, took) = simulate(asked.planner, scene, [self.few, seed]).await?;
+            let looking = Asked { scene: &scene.looking_at(Subject::Volume(field)), ..asked };
+            let [c, d] = last(&looking.run_two(&pilot.setting, region, SAMPLES).await?)?;
+            let products: Vec<f64> = in_common([&c, &a], [&d, &b]).collect();
+            of_fields.push(mean(products.iter().copied()));
+            apart.iter_mut().zip(products).for_each(|(sum, p)| *sum += p / FIELDS as f64);
+            ms = ms.min(took);
+        }
+        let per_piece = 1.0 / self.few as f64 + 1.0 / self.work as f64;
+        let squared = mean(apart.iter().copied()).max(0.0) / pilot.scale.powi(2) / per_piece;
+        // Pixels of one voxel are one.
+        let alike = (pixels_per_voxel / f64::from(region.apart)).max(1.0).powi(2);
+        Ok(FieldWork {
+            of: self.asked.work.of,
+            squared,
+            chance: by_chance((independent(&apart) / alike).min(freedom(&of_fields))),
+            ms: self.line(ms),
+            given: self.asked.given,
+            most: self.most,
+            looks: self.asked.work.looks,
+        })
+    }
+
+    /// What the device takes besides the work and for one piece of it, where the small fields take so long.
+    fn line(&self, few_ms: f64) -> [f64; 2] {
+        let each = self.ms / self.work as f64;
+        // What few pieces take as long for as many is not their own time.
+        let one = ((self.ms - few_ms) / (self.work - self.few).max(1) as f64).clamp(0.5 * each, each);
+        [self.ms - one * self.work as f64, one]
+    }
+
+    /// Puts so much work into a request.
+    pub fn put_into(&self, request: &mut Value, work: u64) {
+        request["volume"][self.asked.technique][self.asked.work.of] = json!(work);
+    }
+}
+
+/// What two runs came to.
+fn last([a, b]: &[Run; 2]) -> Result<[Arc<Round>; 2]> {
+    let rounds = a.rounds().last().cloned().zip(b.rounds().last().cloned());
+    rounds.map(Into::into).ok_or_else(|| Error::internal("a pilot without rounds"))
+}
+
+/// The field of a scene after so much work, by a seed of its own, and its time on the device, ms.
+async fn simulate(planner: &Planner<'_>, scene: &Scene, [work, seed]: [u64; 2]) -> Result<(Arc<Volume>, f64)> {
+    let Subject::Field(field, asked) = scene.subject() else { return Err(Error::internal("there is no field")) };
+    let region = Region::some(1.0, [0, 0], scene.image());
+    let pilot = scene.looking_at(Subject::Field(field.with(work, seed), *asked)).into_pilot(region, 1);
+    let job = to_its_end(planner, pilot).await?;
+    let field = job.field().ok_or_else(|| Error::internal("a pilot without its field"))?;
+    Ok((field, job.field_ms().max(f64::MIN_POSITIVE)))
+}
+
+impl FieldWork {
+    /// So much of it.
+    pub fn of(&self, amount: u64) -> FieldAmount {
+        FieldAmount { of: self.of, amount }
+    }
+
+    /// The square of what it brings after so much, with as much as may be by chance.
+    pub fn squared_after(&self, amount: u64, by_chance: f64) -> f64 {
+        by_chance * by_chance * self.squared / amount as f64
+    }
+
+    /// The least that is wrong by no more than `room`, squared; none where that is more than is permitted, or than is asked for.
+    pub fn needed(&self, room: f64) -> Option<u64> {
+        let least = (self.squared_after(1, self.chance) / room).max(1.0);
+        match self.given {
+            Some(given) => (room > 0.0 && least <= given as f64).then_some(given),
+            None => (room > 0.0 && least <= self.most as f64).then(|| rounded_up(least).min(self.most)),
+        }
+    }
+
+    /// How much there is time for, besides what any amount takes.
+    pub fn in_time(&self, ms: f64) -> u64 {
+        self.given.unwrap_or(((ms / self.ms[1]) as u64).clamp(1, self.most))
+    }
+
+    /// What it costs, with the pictures on the way.
+    pub fn cost(&self, amount: u64, picture_ms: f64) -> f64 {
+        self.ms[0] + self.ms[1] * amount as f64 + f64::from(self.looks) * picture_ms
+    }
+}
+
+/// Of how many pixels a sum of squares is, (Σ s)² / Σ s², where the square of one that is known by so many fields is too large by 1 + 2/k.
+fn independent(squares: &[f64]) -> f64 {
+    let (sum, of_squares) = squares.iter().fold((0.0, 0.0), |(sum, of_squares), s| (sum + s, of_squares + s * s));
+    if of_squares > 0.0 { sum * sum / of_squares * (1.0 + 2.0 / FIELDS as f64) } else { 1.0 }
+}
+
+/// How free sums of squares are that vary so from one to the next: ν = 2 m² / s².
+fn freedom(sums: &[f64]) -> f64 {
+    let m = mean(sums.iter().copied());
+    let variance = sums.iter().map(|s| (s - m).powi(2)).sum::<f64>() / (sums.len() - 1) as f64;
+    2.0 * m * m / variance
+}
+
+/// What a picture may be wrong by over what pictures of all fields are, in 19 of 20: the square is a ratio of sums of ν squares and of
+/// k ν, and that has Fisher's distribution.
+fn by_chance(freedom: f64) -> f64 {
+    let freedom = if freedom.is_finite() { freedom.clamp(1.0, MOST_FREEDOM) } else { MOST_FREEDOM };
+    let ratio = FisherSnedecor::new(freedom, FIELDS as f64 * freedom);
+    ratio.map_or(1.0, |ratio| ratio.inverse_cdf(0.95)).sqrt()
+}
+
+/// With few digits, and no less.
+fn rounded_up(amount: f64) -> u64 {
+    let digit = 10f64.powf((ROUNDED * amount).log10().floor()).max(1.0);
+    ((amount / digit).ceil() * digit) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chance_is_that_of_tables() {
+        // F of 1 and 8 degrees of freedom at 0.95 is 5.318, of 4 and 32 it is 2.668.
+        assert!((by_chance(1.0).powi(2) - 5.318).abs() < 1e-3, "{}", by_chance(1.0).powi(2));
+        assert!((by_chance(4.0).powi(2) - 2.668).abs() < 1e-3, "{}", by_chance(4.0).powi(2));
+        assert!(by_chance(1e9) < 1.02 && by_chance(f64::NAN) < 1.02 && by_chance(0.0) == by_chance(1.0));
+        assert!((freedom(&[1.0, 3.0, 1.0, 3.0]) - 2.0 * 4.0 / (4.0 / 3.0)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn work_is_as_much_as_the_room_asks_for() {
+        let work = FieldWork {
+            of: "photons",
+            squared: 1000.0,
+            chance: 1.2,
+            ms: [5.0, 1e-3],
+            given: None,
+            most: 1_000_000,
+            looks: 5,
+        };
+        // 1.44 × 1000 / 0.01 = 144000.
+        assert_eq!(work.needed(0.01), Some(144_000));
+        assert_eq!((work.needed(1e-4), work.needed(0.0), work.needed(-1.0)), (None, None, None));
+        assert_eq!((rounded_up(123_456.0), rounded_up(99.2), rounded_up(3.0)), (124_000, 100, 3));
+        assert_eq!((work.in_time(100.0), work.in_time(-1.0)), (100_000, 1));
+        let given = FieldWork { given: Some(200_000), ..work };
+        assert_eq!((given.needed(0.01), given.needed(0.001)), (Some(200_000), None));
+    }
+}

@@ -1,0 +1,306 @@
+//! The validated request: what a render looks at, from where, how, and when it stops. Fields are private: what a [`Scene`] holds has been
+//! checked, and nothing downstream checks again.
+
+pub(crate) mod region;
+mod schema;
+mod subject;
+
+use std::sync::Arc;
+
+use serde_json::{Map, Value};
+
+use crate::config::Limits;
+use crate::error::{Error, Result};
+use crate::film::picture::Background;
+use crate::request::{self, BudgetRequest, CameraRequest, ImageRequest, RenderRequest};
+use crate::scene::camera::{Camera, Framing};
+use crate::scene::clip::Clip;
+use crate::technique::{self, Kind, Setting, Technique, View};
+use crate::volume::{Store, Volume};
+use region::Region;
+pub use schema::{parameters_schema, schema};
+pub use subject::{AskedWork, Subject};
+
+/// The technique of a request that leaves it to the planner.
+pub const AUTO: &str = "auto";
+/// Pixels a side when the request is silent.
+const DEFAULT_SIDE: u32 = 512;
+/// Samples when the budget is silent: enough that the jitter's noise is below a grey level in most pictures.
+const DEFAULT_SAMPLES: u32 = 16;
+
+/// When a render stops: at the first that is reached.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Budget {
+    /// Samples per pixel.
+    pub samples: u32,
+    /// Milliseconds since the render's start.
+    pub time_ms: Option<u64>,
+    /// The error, as the film estimates it.
+    pub max_error: Option<f64>,
+}
+
+/// A valid render request with its defaults resolved.
+#[derive(Clone)]
+pub struct Scene {
+    technique: &'static Technique,
+    view: Arc<dyn View>,
+    own: Arc<str>,
+    given: Arc<Map<String, Value>>,
+    level: Option<u32>,
+    asked_samples: Option<u32>,
+    subject: Subject,
+    framing: Framing,
+    camera: Camera,
+    clip: Clip,
+    image: [u32; 2],
+    background: Background,
+    budget: Budget,
+    seed: u64,
+    pilot: Option<Region>,
+}
+
+impl Scene {
+    /// Checks `body` and resolves its defaults; loads the volume that it names.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] with JSON pointers and permitted ranges.
+    pub fn from_json(body: &Value, store: &Store, limits: &Limits) -> Result<Self> {
+        if !body.is_object() {
+            return Err(Error::invalid("", "not an object", "a JSON object with at least technique"));
+        }
+        let request: RenderRequest = request::parse(body, schema(limits), "")?;
+        if request.technique == AUTO {
+            let permitted = "a technique's name; POST /v1/renders and /v1/plan resolve it";
+            return Err(Error::invalid("/technique", "this has to be planned first", permitted));
+        }
+        let technique = technique::find(&request.technique)
+            .ok_or_else(|| Error::internal("the schema permits a technique that is not in the list"))?;
+        let Kind::View { parse, .. } = technique.kind else {
+            return Err(Error::invalid(
+                "/technique",
+                "this is a field technique",
+                "a view; put the field under volume",
+            ));
+        };
+        let own = own_parameters(technique, &request)?;
+        let view =
+            parse(&own, &format!("/{}", technique.name)).map_err(|e| where_it_was_given(e, technique, &request))?;
+        let (subject, framing) = subject::of_request(request.volume.as_ref(), store, limits)?;
+        if view.shows_labels() && request.volume.as_ref().is_some_and(|v| v.level.is_some_and(|l| l > 0)) {
+            return Err(Error::invalid("/volume/level", "there is no mean of labels", "0, or leave it out"));
+        }
+        let camera = Camera::from_request(request.camera.as_ref(), &framing)?;
+        let clip = Clip::from_request(request.clip.as_ref())?;
+        if request.clip.is_some() && !view.clips() {
+            let detail = format!("{} shows the whole volume: light comes from everywhere", technique.name);
+            return Err(Error::invalid("/clip", detail, "leave it out, or another technique"));
+        }
+        let image = request.image.unwrap_or_default();
+        let background = background(&image)?;
+        let image = [image.width.unwrap_or(DEFAULT_SIDE), image.height.unwrap_or(DEFAULT_SIDE)];
+        let asked = request.budget.unwrap_or_default();
+        let (budget, asked_samples) = (budget(&asked, limits), asked.samples);
+        let scene = Self {
+            technique,
+            view,
+            own: format!("{} {own}", technique.name).into(),
+            given: Arc::new(own.as_object().cloned().unwrap_or_default()),
+            level: request.volume.as_ref().and_then(|v| v.level),
+            asked_samples,
+            subject,
+            framing,
+            camera,
+            clip,
+            image,
+            background,
+            budget,
+            seed: request.seed.unwrap_or(0),
+            pilot: None,
+        };
+        scene.checked()
+    }
+
+    /// The scene, once its view and its volume are found to go together.
+    fn checked(self) -> Result<Self> {
+        if let Subject::Volume(volume) = &self.subject {
+            self.view.plan(volume)?;
+            // Made here, so that the device thread finds them there.
+            self.words_of(volume)?;
+        }
+        Ok(self)
+    }
+
+    /// The same picture by another of its settings.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] where the setting and the scene do not go together.
+    pub(crate) fn with_setting(&self, setting: &Setting) -> Result<Self> {
+        let mut scene = self.clone();
+        if let Some(view) = &setting.view {
+            scene.technique = technique::find(setting.technique)
+                .ok_or_else(|| Error::internal("a setting of a technique that is not in the list"))?;
+            scene.view = view.clone();
+            scene.own = format!("{} {}: {}", setting.technique, self.own, setting.words).into();
+        }
+        if let (Subject::Volume(volume), Some(level)) = (&self.subject, setting.level) {
+            scene.subject = Subject::Volume(volume.level(level));
+        }
+        scene.checked()
+    }
+
+    /// The same scene from another camera, given as the body of `PUT …/camera`.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the field under `/camera`.
+    pub fn camera_from_json(&self, body: &Value) -> Result<Camera> {
+        let request: CameraRequest = request::parse(body, request::schema_of::<CameraRequest>(), "/camera")?;
+        Camera::from_request(Some(&request), &self.framing)
+    }
+
+    /// Puts another camera in.
+    pub fn set_camera(&mut self, camera: Camera) {
+        self.camera = camera;
+    }
+
+    /// Only these pixels of the picture, with so many samples, and with the picture as it was after fewer.
+    pub(crate) fn into_pilot(self, region: Region, samples: u32) -> Self {
+        Self { pilot: Some(region), budget: Budget { samples, time_ms: None, max_error: None }, ..self }
+    }
+
+    /// The same with another seed.
+    pub(crate) fn with_seed(self, seed: u64) -> Self {
+        Self { seed, ..self }
+    }
+
+    /// The same with another subject.
+    pub(crate) fn looking_at(&self, subject: Subject) -> Self {
+        Self { subject, ..self.clone() }
+    }
+
+    /// The samples of the budget, where the request gives them.
+    pub(crate) fn asked_samples(&self) -> Option<u32> {
+        self.asked_samples
+    }
+
+    /// The level of the volume, where the request gives one.
+    pub(crate) fn level(&self) -> Option<u32> {
+        self.level
+    }
+
+    /// The view's own parameters as the request has them, with those that it shares.
+    pub(crate) fn given(&self) -> &Map<String, Value> {
+        &self.given
+    }
+
+    /// Whether it has only some of its pixels, for a planner.
+    pub(crate) fn is_pilot(&self) -> bool {
+        self.pilot.is_some()
+    }
+
+    /// The pixels of the picture that it has: but for a pilot all of them.
+    pub(crate) fn region(&self) -> Region {
+        self.pilot.unwrap_or(Region::every(1, self.image))
+    }
+
+    /// The view technique.
+    pub fn technique(&self) -> &'static Technique {
+        self.technique
+    }
+    /// The view with its parameters.
+    pub fn view(&self) -> &Arc<dyn View> {
+        &self.view
+    }
+    /// The technique and its own parameters as the request has them: what belongs to those alone can be kept by it.
+    pub(crate) fn own(&self) -> &Arc<str> {
+        &self.own
+    }
+    /// The words that the view takes a volume's floats as, where it does.
+    ///
+    /// # Errors
+    /// As [`View::plan`].
+    pub(crate) fn words_of(&self, volume: &Volume) -> Result<Option<Arc<Volume>>> {
+        Ok(self.view.resolution(volume)?.and_then(|resolution| volume.words(resolution)))
+    }
+    /// What is looked at.
+    pub fn subject(&self) -> &Subject {
+        &self.subject
+    }
+    /// The camera.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+    /// What of the volume is shown.
+    pub fn clip(&self) -> &Clip {
+        &self.clip
+    }
+    /// What is behind the volume.
+    pub fn background(&self) -> Background {
+        self.background
+    }
+    /// Width and height in pixels.
+    pub fn image(&self) -> [u32; 2] {
+        self.image
+    }
+    /// When to stop.
+    pub fn budget(&self) -> Budget {
+        self.budget
+    }
+    /// The seed of every random number.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+}
+
+fn background(image: &ImageRequest) -> Result<Background> {
+    match (image.background, image.transparent) {
+        (Some(_), Some(true)) => Err(Error::invalid(
+            "/image/background",
+            "the picture is to be transparent",
+            "one of background and transparent",
+        )),
+        (_, Some(true)) => Ok(Background::Transparent),
+        (color, _) => Ok(Background::Colour(color.unwrap_or_default().map(|c| c as f32))),
+    }
+}
+
+/// The sections of the request that techniques share, where it has them.
+fn shared_sections(request: &RenderRequest) -> [(&'static str, &Option<Value>); 2] {
+    [("medium", &request.medium), ("lights", &request.lights)]
+}
+
+/// A technique's own parameters, with the sections of the request that it shares put among them.
+fn own_parameters(technique: &Technique, request: &RenderRequest) -> Result<Value> {
+    let mut own = request.parameters.get(technique.name).cloned().unwrap_or_else(|| Value::Object(Default::default()));
+    for (name, shared) in shared_sections(request) {
+        let Some(shared) = shared else { continue };
+        if !technique.shares.contains(&name) {
+            let sharing: Vec<&str> = technique::views().filter(|t| t.shares.contains(&name)).map(|t| t.name).collect();
+            let detail = format!("{} scatters no light", technique.name);
+            let permitted = format!("{}, or leave it out", sharing.join(" or "));
+            return Err(Error::invalid(format!("/{name}"), detail, permitted));
+        }
+        if own.get(name).is_some() {
+            let detail = format!("/{}/{name} is given too", technique.name);
+            return Err(Error::invalid(format!("/{name}"), detail, "in one place"));
+        }
+        own[name] = shared.clone();
+    }
+    Ok(own)
+}
+
+/// The error with the pointers that the request has, for sections that were put among a technique's own parameters.
+fn where_it_was_given(error: Error, technique: &Technique, request: &RenderRequest) -> Error {
+    let shared = shared_sections(request);
+    error.with_pointers(|pointer| {
+        let rest = pointer.strip_prefix(&format!("/{}", technique.name))?;
+        let name = rest.strip_prefix('/')?.split('/').next()?;
+        shared.iter().any(|(section, given)| *section == name && given.is_some()).then(|| rest.to_owned())
+    })
+}
+
+/// A budget that names only a time or an error may take as many samples as the server permits.
+fn budget(request: &BudgetRequest, limits: &Limits) -> Budget {
+    let open = request.time_ms.is_some() || request.max_error.is_some();
+    let default = if open { limits.max_samples } else { DEFAULT_SAMPLES.min(limits.max_samples) };
+    Budget { samples: request.samples.unwrap_or(default), time_ms: request.time_ms, max_error: request.max_error }
+}

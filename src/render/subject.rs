@@ -1,0 +1,101 @@
+//! What a request looks at: a volume, at a level of it, or a field.
+
+use std::sync::Arc;
+
+use serde_json::Value;
+
+use crate::config::Limits;
+use crate::error::{Error, Result};
+use crate::request::VolumeRequest;
+use crate::scene::camera::Framing;
+use crate::technique::{self, Field, Kind, Technique, Work};
+use crate::volume::{Store, Volume, builtin};
+
+/// What is looked at.
+#[derive(Clone)]
+pub enum Subject {
+    /// A volume that is there.
+    Volume(Arc<Volume>),
+    /// A volume that is computed first, and how much work is asked for.
+    Field(Arc<dyn Field>, AskedWork),
+}
+
+/// How much of a field is asked for.
+#[derive(Clone, Copy)]
+pub struct AskedWork {
+    /// The technique's name.
+    pub technique: &'static str,
+    /// The parameter that says how much.
+    pub work: Work,
+    /// How much the request says, where it says so.
+    pub given: Option<u64>,
+}
+
+/// What a request looks at, with the framing of it; loads the volume that it names.
+///
+/// # Errors
+/// [`Error::Invalid`] with a pointer under `/volume`.
+pub(super) fn of_request(
+    request: Option<&VolumeRequest>,
+    store: &Store,
+    limits: &Limits,
+) -> Result<(Subject, Framing)> {
+    let Some(request) = request else { return Ok(at_level(&built_in("smoke", None, None, store)?, 0)) };
+    let given = usize::from(request.id.is_some()) + usize::from(request.builtin.is_some()) + request.field.len();
+    if given != 1 {
+        let permitted = "exactly one of id, builtin, or a field technique";
+        return Err(Error::invalid("/volume", format!("{given} sources are given"), permitted));
+    }
+    if request.builtin.is_none() {
+        for (name, set) in [("resolution", request.resolution.is_some()), ("seed", request.seed.is_some())] {
+            if set {
+                return Err(Error::invalid(
+                    format!("/volume/{name}"),
+                    "only for a built-in volume",
+                    "leave it out, or name a builtin",
+                ));
+            }
+        }
+    }
+    if request.level.is_some() && !request.field.is_empty() {
+        return Err(Error::invalid("/volume/level", "a field has no coarser levels", "leave it out, or a volume"));
+    }
+    let level = request.level.unwrap_or(0) as usize;
+    if let Some(id) = &request.id {
+        return Ok(at_level(&store.named(id, "/volume/id")?, level));
+    }
+    if let Some(name) = &request.builtin {
+        return Ok(at_level(&built_in(name, request.resolution, request.seed, store)?, level));
+    }
+    let (name, parameters) = request.field.iter().next().ok_or_else(|| Error::internal("a field without a name"))?;
+    let technique = technique::find(name);
+    let Some((technique, Kind::Field { parse, work })) = technique.map(|t| (t, t.kind)) else {
+        return Err(Error::internal("the schema permits a field that is not in the list"));
+    };
+    let field = parse(&within_limits(technique, work, parameters, limits), &format!("/volume/{name}"), store)?;
+    let framing = field.framing();
+    let given = parameters.get(work.of).and_then(Value::as_u64);
+    Ok((Subject::Field(field, AskedWork { technique: technique.name, work, given }), framing))
+}
+
+/// The parameters with a default amount of work that the limits permit.
+fn within_limits(technique: &Technique, work: Work, parameters: &Value, limits: &Limits) -> Value {
+    let mut parameters = parameters.clone();
+    let default = (technique.schema)()["properties"][work.of]["default"].as_u64();
+    if let (Some(fields), Some(default)) = (parameters.as_object_mut(), default) {
+        fields.entry(work.of).or_insert(default.min((work.most)(limits)).into());
+    }
+    parameters
+}
+
+fn at_level(volume: &Arc<Volume>, level: usize) -> (Subject, Framing) {
+    (Subject::Volume(volume.level(level)), Framing::from(&**volume))
+}
+
+fn built_in(name: &str, resolution: Option<u32>, seed: Option<u64>, store: &Store) -> Result<Arc<Volume>> {
+    if !builtin::NAMES.contains(&name) {
+        let permitted = builtin::NAMES.join(", ");
+        return Err(Error::invalid("/volume/builtin", format!("there is no built-in volume '{name}'"), permitted));
+    }
+    store.builtin(name, resolution.unwrap_or(128) as usize, seed.unwrap_or(0))
+}

@@ -1,0 +1,176 @@
+//! What all jobs on the device thread share: the device, the volumes on it, what is compiled.
+
+use std::collections::HashMap;
+use std::rc::Rc;
+use std::sync::{Arc, Weak};
+use std::time::{Duration, Instant};
+
+use super::compile::Compiler;
+use super::device_volume::DeviceVolume;
+use super::first::first_kernels;
+use super::kernels::Kernels;
+use super::sources;
+use super::warm::{is_cached, warm};
+use crate::device::cells::Cells;
+use crate::device::program::Variant;
+use crate::device::{Buffer, Device, DeviceConfig, encode};
+use crate::error::{Error, Result};
+use crate::volume::Volume;
+
+/// Device memory for volumes that no job uses just now.
+const IDLE_VOLUME_BYTES: usize = 1 << 30;
+
+/// Everything on the device that outlives a job.
+pub(super) struct DeviceContext {
+    pub device: Device,
+    /// That films are developed by.
+    pub curve: Rc<Buffer>,
+    volumes: HashMap<usize, (Weak<Volume>, Rc<DeviceVolume>)>,
+    /// Rays a millisecond of the last pass, by kernel variant.
+    speed: HashMap<Variant, f64>,
+    kernels: Kernels,
+    /// Whether processes compile them.
+    compiles_ahead: bool,
+}
+
+impl Drop for DeviceContext {
+    fn drop(&mut self) {
+        self.kernels.close();
+    }
+}
+
+impl DeviceContext {
+    /// Opens the device with as many lanes as it likes, or with fewer where the first kernels do not build for so many.
+    /// `kernels` is told what is compiled, and compiles ahead from then on; `wake` is called as that goes on.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] when there is no device, or the first kernels build for no number of lanes.
+    pub fn open(config: &DeviceConfig, kernels: Kernels, wake: impl Fn() + Send + Clone + 'static) -> Result<Self> {
+        let mut gave_up: Vec<String> = Vec::new();
+        let mut lanes = config.lanes;
+        loop {
+            let mut device = Device::open(&DeviceConfig { lanes, ..config.clone() })?;
+            let used = device.info().lanes;
+            let started = Instant::now();
+            match first_kernels(&mut device, Compiler::of(config, used).as_ref()) {
+                Ok(()) => {
+                    let (level, ms) = (device.info().level, started.elapsed().as_millis() as u64);
+                    tracing::info!(ms, lanes = used, level, "the first kernels are there");
+                    device.note_given_up(gave_up);
+                    let (volumes, speed) = (HashMap::new(), HashMap::new());
+                    let curve = encode::curve(&device)?;
+                    let mut context = Self { device, curve, volumes, speed, kernels, compiles_ahead: false };
+                    context.compile_ahead(config, wake)?;
+                    return Ok(context);
+                }
+                Err(cause) => {
+                    let narrower = [8, 4, 1].into_iter().find(|n| *n < used && config.lanes.is_none());
+                    tracing::error!(lanes = used, %cause, ?narrower, "the first kernels do not build");
+                    gave_up.push(format!("{used} lanes: the first kernels do not build"));
+                    lanes = Some(narrower.ok_or(cause)?);
+                }
+            }
+        }
+    }
+
+    /// Lets processes compile what is likely to be asked for, where PoCL keeps what they compile; elsewhere the device thread does it
+    /// when it has nothing else to do.
+    fn compile_ahead(&mut self, config: &DeviceConfig, wake: impl Fn() + Send + Clone + 'static) -> Result<()> {
+        for variant in sources::first() {
+            self.kernels.set(&variant, true);
+        }
+        let Some(compiler) = Compiler::of(config, self.device.info().lanes) else { return Ok(()) };
+        for variant in sources::common() {
+            self.kernels.ask(&variant, false);
+            if is_cached(&self.device, &variant) {
+                self.kernels.set(&variant, true);
+            }
+        }
+        self.compiles_ahead = self.device.info().is_pocl();
+        if self.compiles_ahead { self.kernels.start(&compiler, wake) } else { Ok(()) }
+    }
+
+    /// Whether a variant can be run now: builds it where it is compiled, or where nobody compiles ahead. One that cannot yet is asked for.
+    ///
+    /// # Errors
+    /// [`Error::Kernel`] for one that does not build on this device.
+    pub fn is_ready(&mut self, variant: &Variant) -> Result<bool> {
+        if self.device.is_built(variant) {
+            return Ok(true);
+        }
+        match self.kernels.is_compiled(variant) {
+            None if self.compiles_ahead => {
+                self.kernels.ask(variant, true);
+                return Ok(false);
+            }
+            Some(false) => {}
+            _ => self.build(variant),
+        }
+        let lanes = self.device.info().lanes;
+        let built = self.device.is_built(variant);
+        if built { Ok(true) } else { Err(Error::Kernel { variant: variant.label(), lanes }) }
+    }
+
+    fn build(&mut self, variant: &Variant) {
+        let built = warm(&mut self.device, variant);
+        if let Err(cause) = &built {
+            tracing::error!(kernel = variant.label(), %cause, "a kernel does not build");
+        }
+        self.kernels.set(variant, built.is_ok());
+    }
+
+    /// Builds one variant that is likely to be asked for, where nobody else does; whether there was one.
+    pub fn build_ahead(&mut self) -> bool {
+        let next = if self.compiles_ahead { None } else { self.kernels.take() };
+        next.inspect(|variant| self.build(variant)).is_some()
+    }
+
+    /// The volume on the device, uploaded and its cells built at first use.
+    pub fn volume(&mut self, volume: &Arc<Volume>) -> Result<Rc<DeviceVolume>> {
+        let key = Arc::as_ptr(volume) as usize;
+        if let Some((weak, buffer)) = self.volumes.get(&key)
+            && weak.strong_count() > 0
+        {
+            return Ok(buffer.clone());
+        }
+        let voxels = self.device.upload(volume.voxels().as_bytes(), 8)?;
+        let cells = Cells::new(&mut self.device, &voxels, volume.dims(), volume.voxel_type())?;
+        let [wide, high, deep] = volume.dims();
+        let most = self.device.info().largest_image_3d;
+        let fits = wide <= most[0] && high <= most[1] && deep <= most[2];
+        let voxels = if self.device.info().volumes_are_images {
+            if !fits {
+                return Err(Error::internal(format!("the device takes images of at most {most:?} voxels")));
+            }
+            self.device.upload_image(volume.voxels(), volume.dims())?
+        } else {
+            voxels
+        };
+        let on_device = Rc::new(DeviceVolume::new(voxels, cells));
+        self.volumes.insert(key, (Arc::downgrade(volume), on_device.clone()));
+        self.tidy();
+        Ok(on_device)
+    }
+
+    /// Notes how many rays a variant managed.
+    pub fn measured(&mut self, variant: &Variant, rays: usize, took: Duration) {
+        self.speed.insert(*variant, rays as f64 / (took.as_secs_f64() * 1e3).max(1e-3));
+    }
+
+    /// How many rays a millisecond a variant managed of late, if it has run.
+    pub fn speed(&self, variant: &Variant) -> Option<f64> {
+        self.speed.get(variant).copied()
+    }
+
+    /// Lets go of volumes that are gone from the host, and of idle ones past the limit.
+    pub fn tidy(&mut self) {
+        self.volumes.retain(|_, (weak, _)| weak.strong_count() > 0);
+        let idle = |v: &Rc<DeviceVolume>| Rc::strong_count(v) == 1;
+        let mut bytes: usize = self.volumes.values().filter(|(_, v)| idle(v)).map(|(_, v)| v.bytes()).sum();
+        self.volumes.retain(|_, (_, volume)| {
+            let drop = bytes > IDLE_VOLUME_BYTES && idle(volume);
+            bytes -= if drop { volume.bytes() } else { 0 };
+            !drop
+        });
+    }
+}

@@ -1,0 +1,179 @@
+//! The device thread: goes round the live jobs, a slice each.
+
+use std::collections::VecDeque;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender};
+
+use tokio::sync::{oneshot, watch};
+
+use super::context::DeviceContext;
+use super::kernels::Kernels;
+use super::live::{Live, Rested, Turn};
+use crate::device::{DeviceConfig, NO_DEVICE};
+use crate::error::{Error, Result};
+use crate::film::Film;
+use crate::job::{Job, Readiness};
+
+/// What the device thread is told.
+pub(super) enum Command {
+    /// A render to run.
+    Run(Arc<Job>),
+    /// Somebody wants to see a render's film.
+    Film(Arc<Job>, oneshot::Sender<Result<Film>>),
+    /// A kernel has been compiled, or cannot be.
+    Kernel,
+    /// Nobody is left to ask for anything.
+    Stop,
+}
+
+/// What the device thread starts with.
+pub(super) struct DeviceThread {
+    pub config: DeviceConfig,
+    pub kernels: Kernels,
+    /// To itself, for those who compile its kernels.
+    pub commands: Sender<Command>,
+    pub most_live: usize,
+    /// Bytes of films of ended renders that are kept.
+    pub keep_film_bytes: usize,
+}
+
+/// The renders on the device thread.
+#[derive(Default)]
+struct Renders {
+    waiting: VecDeque<Arc<Job>>,
+    live: VecDeque<Live>,
+    /// Those that wait for a kernel.
+    parked: VecDeque<Live>,
+    /// What ended ones have gathered, the newest last.
+    rested: Vec<Rested>,
+    /// Who wants to see a film.
+    asked: Vec<(Arc<Job>, oneshot::Sender<Result<Film>>)>,
+}
+
+impl DeviceThread {
+    /// Opens the device, then goes round the live jobs, a slice each, until it is told to stop.
+    pub fn run(self, incoming: &Receiver<Command>, readiness: &watch::Sender<Readiness>) {
+        let commands = self.commands.clone();
+        // Who has gone does not need to be woken.
+        let wake = move || drop(commands.send(Command::Kernel));
+        let mut context = match DeviceContext::open(&self.config, self.kernels.clone(), wake) {
+            Ok(context) => context,
+            Err(error) => {
+                tracing::error!(%error, "{NO_DEVICE}");
+                readiness.send_replace(Readiness::Failed(error.to_string()));
+                // Whoever got in before must not wait for ever.
+                loop {
+                    match incoming.recv() {
+                        Ok(Command::Run(job)) => drop(job.fail(&Error::Unavailable(NO_DEVICE.into()))),
+                        Ok(Command::Kernel | Command::Film(..)) => {}
+                        Ok(Command::Stop) | Err(_) => return,
+                    }
+                }
+            }
+        };
+        readiness.send_replace(Readiness::Ready(Arc::new(context.device.info().clone())));
+        let mut renders = Renders::default();
+        loop {
+            if renders.live.is_empty() && renders.waiting.is_empty() {
+                renders.forget();
+                context.tidy();
+                if !context.build_ahead() {
+                    match incoming.recv() {
+                        Ok(Command::Stop) | Err(_) => return,
+                        Ok(command) => renders.told(command),
+                    }
+                }
+            }
+            for command in incoming.try_iter() {
+                if matches!(command, Command::Stop) {
+                    return;
+                }
+                renders.told(command);
+            }
+            renders.turn(&mut context, self.most_live, self.keep_film_bytes);
+            renders.show(&context);
+        }
+    }
+}
+
+impl Renders {
+    fn told(&mut self, command: Command) {
+        match command {
+            Command::Run(job) => self.waiting.push_back(job),
+            Command::Film(job, to) => self.asked.push((job, to)),
+            Command::Kernel => self.live.append(&mut self.parked),
+            Command::Stop => {}
+        }
+    }
+
+    /// A turn of the next.
+    fn turn(&mut self, context: &mut DeviceContext, most_live: usize, keep_film_bytes: usize) {
+        self.waiting.retain(|job| !job.state().is_terminal());
+        while self.live.len() < most_live {
+            let Some(job) = self.waiting.pop_front() else { break };
+            let rested = self.memory_for(&job, keep_film_bytes);
+            self.live.push_back(Live::new(job, rested));
+        }
+        metrics::gauge!("cloudchamber_renders_live").set(self.live.len() as f64);
+        metrics::gauge!("cloudchamber_renders_waiting").set((self.waiting.len() + self.parked.len()) as f64);
+        let Some(mut current) = self.live.pop_front() else { return };
+        // A panic in one job is that job's failure and nobody else's.
+        match catch_unwind(AssertUnwindSafe(|| current.turn(context))) {
+            Ok(Ok(Turn::Again)) => self.live.push_back(current),
+            Ok(Ok(Turn::Waits)) => self.parked.push_back(current),
+            Ok(Ok(Turn::Over)) => self.rest(current, keep_film_bytes),
+            Ok(Err(error)) => current.fail(error),
+            Err(_) => current.fail(Error::internal("a panic on the device thread")),
+        }
+    }
+
+    /// What a render is to gather in: what it gathered before, or what the oldest did where that would be let go of for it.
+    fn memory_for(&mut self, job: &Arc<Job>, keep_film_bytes: usize) -> Option<Rested> {
+        let own = self.rested.iter().position(|r| r.is_of(job));
+        let newest = self.rested.last().map_or(0, |r| r.gathered.bytes());
+        let oldest = || self.oldest(keep_film_bytes.saturating_sub(newest));
+        own.or_else(oldest).map(|at| self.rested.remove(at))
+    }
+
+    /// Keeps what an ended render has gathered, and lets go of the oldest past the limit.
+    fn rest(&mut self, ended: Live, keep_film_bytes: usize) {
+        self.forget();
+        self.rested.extend(ended.rest());
+        while let Some(oldest) = self.oldest(keep_film_bytes) {
+            self.rested.remove(oldest);
+        }
+    }
+
+    /// The oldest that may go where all are more than `keep_film_bytes`: not the newest, however large, nor what somebody waits for.
+    fn oldest(&self, keep_film_bytes: usize) -> Option<usize> {
+        let bytes: usize = self.rested.iter().map(|r| r.gathered.bytes()).sum();
+        let (_, others) = self.rested.split_last().filter(|_| bytes > keep_film_bytes)?;
+        others.iter().position(|r| !r.job.upgrade().is_some_and(|job| job.is_film_wanted()))
+    }
+
+    /// Lets go of what nobody can ask for any more.
+    fn forget(&mut self) {
+        self.rested.retain(|rested| rested.job.strong_count() > 0);
+    }
+
+    /// Shows films to who asked: at once where there is something to see, else once there is; not where the render has left nothing.
+    fn show(&mut self, context: &DeviceContext) {
+        for (job, to) in std::mem::take(&mut self.asked) {
+            let mut live = self.live.iter_mut().chain(&mut self.parked).filter(|live| live.is_of(&job));
+            let rested = self.rested.iter_mut().find(|rested| rested.is_of(&job));
+            let waits = self.waiting.iter().any(|waiting| Arc::ptr_eq(waiting, &job));
+            let film = match (live.next(), rested) {
+                (Some(live), _) => live.film(context),
+                (None, Some(rested)) => rested.gathered.film(context).map(Some),
+                (None, None) if waits => Ok(None),
+                (None, None) => continue,
+            };
+            match film.transpose() {
+                // Who has gone does not need to be told.
+                Some(film) => drop(to.send(film)),
+                None => self.asked.push((job, to)),
+            }
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! One set of samples of a view on the device, and which of its pixels a pass samples.
+
+use std::rc::Rc;
+
+use super::context::DeviceContext;
+use super::tiling::{TILE, Tiling};
+use crate::device::encode::PADDING;
+use crate::device::{Buffer, Device};
+use crate::error::Result;
+use crate::film::Samples;
+use crate::render::Scene;
+
+/// One set of samples on the device.
+pub(super) struct Layer {
+    pub buffer: Buffer,
+    pub width: usize,
+    pub height: usize,
+    pub stride: usize,
+    /// How far apart its pixels are in the picture asked for: further than in the film's where that is a pilot's.
+    pub apart: usize,
+    pub samples: u32,
+    /// The kernel's table for its step.
+    pub table: Rc<Buffer>,
+    /// Its step, world units.
+    pub step: f32,
+    /// Tells its random numbers from the others'.
+    pub stream: u32,
+    /// Of a view that renders tiles: what its passes sample.
+    tiling: Option<(Tiling, Buffer)>,
+}
+
+impl Layer {
+    /// Room for every `stride`-th pixel of a scene's picture, or of the pixels of it that a pilot has; `room` itself where that is as large.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Internal`] when the device has none.
+    pub fn new(
+        device: &Device,
+        scene: &Scene,
+        table: Rc<Buffer>,
+        stride: usize,
+        stream: u32,
+        step: f32,
+        room: Option<Buffer>,
+    ) -> Result<Self> {
+        let region = scene.region();
+        let apart = stride * region.apart as usize;
+        let [width, height] = region.size.map(|n| (n as usize).div_ceil(apart));
+        let tiled = |_| -> Result<_> {
+            let tiling = Tiling::new(width, height);
+            let buffer = device.upload(&vec![0; tiling.room()], 0)?;
+            Ok((tiling, buffer))
+        };
+        let tiling = scene.view().random().map(tiled).transpose()?;
+        let buffer = device.allocate_in(room, 20 * width * height + PADDING)?;
+        Ok(Self { buffer, width, height, stride, apart, samples: 0, table, step, stream, tiling })
+    }
+
+    /// Forgets what was gathered.
+    pub fn restart(&mut self, device: &Device) -> Result<()> {
+        self.samples = 0;
+        if let Some((tiling, buffer)) = &mut self.tiling {
+            tiling.restart();
+            device.write(buffer, 0, &vec![0; buffer.len()])?;
+        }
+        Ok(())
+    }
+
+    /// A pass is over.
+    pub fn passed(&mut self) {
+        self.samples += 1;
+        if let Some((tiling, _)) = &mut self.tiling {
+            tiling.passed();
+        }
+    }
+
+    /// What a kernel is told of the tiles.
+    pub fn tiles(&self) -> Option<&Buffer> {
+        self.tiling.as_ref().map(|(_, buffer)| buffer)
+    }
+
+    /// Tells the device which tiles the next pass samples; an adaptive one those with the more noise the more often.
+    pub fn choose_tiles(&mut self, context: &DeviceContext, adaptive: bool) -> Result<()> {
+        let samples = self.samples;
+        if adaptive && self.tiling.as_ref().is_some_and(|(t, _)| t.is_due(samples)) {
+            let read = self.read(context, true)?;
+            if let Some((tiling, buffer)) = &mut self.tiling {
+                if tiling.wants_costs() {
+                    let mut costs = vec![0u32; tiling.tiles()];
+                    context.device.read(buffer, tiling.costs_at(), &mut costs)?;
+                    tiling.learn_costs(&costs);
+                }
+                tiling.plan(samples, &read.deviations(TILE));
+            }
+        }
+        if let Some((tiling, buffer)) = &mut self.tiling {
+            context.device.write(buffer, 0, bytemuck::cast_slice(&tiling.pass(samples)))?;
+        }
+        Ok(())
+    }
+
+    /// Work-items of a pass, and about how many rays each has.
+    pub fn items(&self, lanes: usize) -> (usize, usize) {
+        if let Some((tiling, _)) = &self.tiling {
+            return tiling.items(lanes);
+        }
+        let [beam_w, beam_h] = beam_pixels(lanes);
+        (self.width.div_ceil(beam_w) * self.height.div_ceil(beam_h), beam_w * beam_h)
+    }
+
+    /// What was gathered, without its values.
+    pub fn unread(&self) -> Samples {
+        Samples {
+            width: self.width,
+            height: self.height,
+            stride: self.stride,
+            count: self.samples,
+            tiles: self.tiling.as_ref().and_then(|(tiling, _)| tiling.counts()),
+            ..Samples::default()
+        }
+    }
+
+    /// What was gathered, with the squared deviations of the samples or without.
+    pub fn read(&self, context: &DeviceContext, deviations: bool) -> Result<Samples> {
+        let pixels = self.width * self.height;
+        let mut samples = self.unread();
+        samples.mean = vec![0.0; 4 * pixels];
+        context.device.read(&self.buffer, 0, &mut samples.mean)?;
+        if deviations {
+            samples.m2 = vec![0.0; pixels];
+            context.device.read(&self.buffer, 16 * pixels, &mut samples.m2)?;
+        }
+        Ok(samples)
+    }
+}
+
+/// Pixels across and down of a work-item: `BEAM_W` × `TILE_W` and `BEAM_H` × `TILE_H` of `kernels/shared/packet.h`.
+fn beam_pixels(lanes: usize) -> [usize; 2] {
+    match lanes {
+        16 => [8, 8],
+        8 => [8, 4],
+        4 => [4, 4],
+        _ => [1, 1],
+    }
+}

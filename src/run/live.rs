@@ -1,0 +1,172 @@
+//! A job on the device thread: its stage, and what it does with a turn.
+
+use std::sync::{Arc, Weak};
+use std::time::{Duration, Instant};
+
+use super::context::DeviceContext;
+use super::field_run::FieldRun;
+use super::gathered::Gathered;
+use super::motion::Motion;
+use super::view_run::ViewRun;
+use crate::error::{Error, Result};
+use crate::film::Film;
+use crate::job::{self, Job};
+use crate::technique::ViewPlan;
+use crate::volume::Volume;
+
+/// A turn of a field: its packets end at very different times, and a longer slice wastes fewer lanes on the last of them.
+const FIELD_SLICE: Duration = Duration::from_millis(40);
+
+/// What a turn came to.
+pub(super) enum Turn {
+    /// There is more to do.
+    Again,
+    /// Nothing can be done before a kernel is compiled.
+    Waits,
+    /// The device is through with the job.
+    Over,
+}
+
+/// What a job does with its next turn.
+pub(super) enum Stage {
+    /// Nothing has begun.
+    New,
+    /// The field begins once its kernels are compiled.
+    AwaitsField,
+    /// The field fills.
+    Fills,
+    /// The view begins once its kernels are compiled. It is planned once, since that may take long.
+    AwaitsView(Arc<Volume>, ViewPlan),
+    /// The view makes one picture of a field that is not complete, which then goes on.
+    Looks,
+    /// The view refines the picture until its budget is used up.
+    Refines,
+}
+
+/// How far the newest camera's frames are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Shown {
+    /// There is none.
+    Nothing,
+    /// The picture of a moving camera is there. It waits until the frame before is encoded.
+    Waits,
+    /// The newest was handed on then.
+    At(Instant),
+}
+
+impl Shown {
+    /// When the newest frame was handed on.
+    pub fn at(self) -> Option<Instant> {
+        if let Self::At(when) = self { Some(when) } else { None }
+    }
+}
+
+/// What is left of a job that has ended.
+pub(super) struct Rested {
+    pub job: Weak<Job>,
+    pub gathered: Gathered,
+    pub motion: Motion,
+}
+
+impl Rested {
+    pub fn is_of(&self, job: &Arc<Job>) -> bool {
+        std::ptr::eq(self.job.as_ptr(), &**job)
+    }
+}
+
+/// A job with its buffers.
+pub(super) struct Live {
+    pub(super) job: Arc<Job>,
+    pub(super) stage: Stage,
+    /// The camera that is worked on; none before the first turn.
+    pub(super) camera: Option<job::Turn>,
+    pub(super) started: Instant,
+    pub(super) field: Option<FieldRun>,
+    pub(super) view: Option<ViewRun>,
+    /// What was gathered earlier, here or for another job: memory for what comes.
+    pub(super) memory: Option<Gathered>,
+    /// What the device took for pictures of the field while it was less complete.
+    pub(super) earlier_time: Duration,
+    pub(super) motion: Motion,
+    pub(super) shown: Shown,
+}
+
+impl Live {
+    /// A job, with memory for what it gathers: its own of an earlier camera, or another's.
+    pub fn new(job: Arc<Job>, rested: Option<Rested>) -> Self {
+        let own = rested.as_ref().is_some_and(|r| r.is_of(&job));
+        let (memory, motion) = rested.map(|r| (r.gathered, r.motion)).unzip();
+        Self {
+            job,
+            stage: Stage::New,
+            camera: None,
+            started: Instant::now(),
+            field: None,
+            view: None,
+            memory,
+            earlier_time: Duration::ZERO,
+            motion: motion.filter(|_| own).unwrap_or_else(Motion::new),
+            shown: Shown::Nothing,
+        }
+    }
+
+    pub fn is_of(&self, job: &Arc<Job>) -> bool {
+        Arc::ptr_eq(&self.job, job)
+    }
+
+    /// The film so far, with its pixels; none where there is nothing yet, or a pass is under way.
+    pub fn film(&mut self, context: &DeviceContext) -> Result<Option<Film>> {
+        let between = self.view.as_mut().filter(|v| v.is_between_passes());
+        let gathered = between.map(|v| &mut v.gathered).filter(|g| g.is_something());
+        gathered.map(|g| g.film(context)).transpose()
+    }
+
+    /// Ends with what was gathered, which stays on the device. Of a render that was cancelled within a pass some pixels have a sample more than
+    /// it says, so that their error is a little less than it says.
+    pub fn rest(self) -> Option<Rested> {
+        let gathered = self.view?.gathered;
+        let job = Arc::downgrade(&self.job);
+        gathered.is_something().then_some(Rested { job, gathered, motion: self.motion })
+    }
+
+    pub fn fail(&self, error: Error) {
+        self.job.fail(&error);
+    }
+
+    /// One turn: a slice of the field or of the view.
+    pub fn turn(&mut self, context: &mut DeviceContext) -> Result<Turn> {
+        if self.job.is_cancelled() || self.job.state().is_terminal() {
+            return Ok(Turn::Over);
+        }
+        match std::mem::replace(&mut self.stage, Stage::New) {
+            Stage::AwaitsField => self.begin_field(context)?,
+            Stage::AwaitsView(volume, plan) => self.run_view(context, volume, plan)?,
+            stage => {
+                self.stage = stage;
+                self.follow_camera(context)?;
+            }
+        }
+        match self.stage {
+            Stage::New => Ok(Turn::Over),
+            Stage::AwaitsField | Stage::AwaitsView(..) => Ok(Turn::Waits),
+            Stage::Fills => self.field_turn(context),
+            Stage::Looks | Stage::Refines => self.view_turn(context),
+        }
+    }
+
+    fn field_turn(&mut self, context: &mut DeviceContext) -> Result<Turn> {
+        let (Some(field), Some(camera)) = (&mut self.field, &self.camera) else { return Ok(Turn::Over) };
+        let mut is_due = field.step(context, FIELD_SLICE)?;
+        let time = camera.scene.budget().time_ms;
+        if time.is_some_and(|ms| self.started.elapsed().as_millis() >= u128::from(ms)) {
+            field.stop(context)?;
+            is_due = true;
+        }
+        if is_due {
+            let volume = field.look(context)?;
+            self.job.set_field(&volume, field.is_over(), 1e3 * field.device_time.as_secs_f64());
+            self.begin_view(context, volume)?;
+        }
+        Ok(Turn::Again)
+    }
+}

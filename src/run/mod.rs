@@ -1,0 +1,101 @@
+//! What works on jobs: the device thread, which goes round the live jobs, a slice each, and compiles kernels beside that.
+//!
+//! A live job has a stage (`live.rs`): its field fills (`field_run.rs`), its view makes a picture of the field on the way, or its view
+//! refines the picture (`view_run.rs`) until its budget is used up (`stopping.rs`).
+
+mod begin;
+mod compile;
+mod context;
+mod device_thread;
+mod device_volume;
+mod distances;
+mod field_run;
+mod first;
+mod gathered;
+mod kernels;
+mod layer;
+mod live;
+mod motion;
+mod rounds;
+mod sample_offsets;
+mod sources;
+mod stopping;
+mod tiling;
+mod view_run;
+mod view_turn;
+mod warm;
+mod warnings;
+
+use std::sync::Arc;
+use std::sync::mpsc::{Sender, channel};
+
+use tokio::sync::{oneshot, watch};
+
+pub use compile::compile_kernels;
+use device_thread::{Command, DeviceThread};
+use kernels::Kernels;
+
+use crate::config::Limits;
+use crate::device::DeviceConfig;
+use crate::error::{Error, Result};
+use crate::film::Film;
+use crate::job::{Executor, Job, KernelProgress, Readiness};
+
+/// The device thread of this process, as an executor of jobs. It ends when this is dropped.
+pub struct DeviceExecutor {
+    commands: Sender<Command>,
+    kernels: Kernels,
+    readiness: watch::Receiver<Readiness>,
+}
+
+impl DeviceExecutor {
+    /// Starts the device thread.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] when no thread can be started.
+    pub fn start(config: DeviceConfig, limits: &Limits) -> Result<Self> {
+        let (commands, incoming) = channel();
+        let (ready, readiness) = watch::channel(Readiness::Starting);
+        let kernels = Kernels::default();
+        let thread = DeviceThread {
+            config,
+            kernels: kernels.clone(),
+            commands: commands.clone(),
+            most_live: limits.live_renders.max(1),
+            keep_film_bytes: limits.keep_film_bytes,
+        };
+        std::thread::Builder::new()
+            .name("device".into())
+            .spawn(move || thread.run(&incoming, &ready))
+            .map_err(Error::internal)?;
+        Ok(Self { commands, kernels, readiness })
+    }
+}
+
+impl Drop for DeviceExecutor {
+    fn drop(&mut self) {
+        // A device thread that has ended by itself needs no telling.
+        drop(self.commands.send(Command::Stop));
+    }
+}
+
+impl Executor for DeviceExecutor {
+    fn take(&self, job: &Arc<Job>) {
+        if self.commands.send(Command::Run(job.clone())).is_err() {
+            job.fail(&Error::internal("the device thread ended"));
+        }
+    }
+
+    fn send_film(&self, job: &Arc<Job>, to: oneshot::Sender<Result<Film>>) {
+        // A device thread that has ended drops the sender, which tells the receiver.
+        drop(self.commands.send(Command::Film(job.clone(), to)));
+    }
+
+    fn readiness(&self) -> watch::Receiver<Readiness> {
+        self.readiness.clone()
+    }
+
+    fn kernels(&self) -> KernelProgress {
+        self.kernels.progress()
+    }
+}

@@ -1,0 +1,249 @@
+//! A picture while the camera moves: what is lowered of it, so that frames keep coming.
+
+use std::rc::Rc;
+
+use super::context::DeviceContext;
+use super::layer::Layer;
+use crate::device::Buffer;
+use crate::error::Result;
+use crate::film::{Film, Lowered};
+use crate::render::Scene;
+
+/// A frame to the next: as often as most screens show one, where that loses no more than [`MOST_LOSS`], with room for what goes wrong;
+const SMOOTH_MS: f64 = 16.0;
+/// else 30 a second.
+const STEADY_MS: f64 = 32.0;
+/// What of that the device may have: at first, at least, at most.
+const SMOOTH_DEVICE_MS: [f64; 3] = [13.0, 2.0, 14.0];
+const STEADY_DEVICE_MS: [f64; 3] = [25.0, 5.0, 29.0];
+/// What a smooth motion may lose, relative.
+const MOST_LOSS: f64 = 0.09;
+/// How much the device's part may change from one frame to the next: down at once, up slowly, so that pictures do not change to and fro.
+const CHANGE: [f64; 2] = [0.9, 1.03];
+/// Pixels that a sample stands for along a side, at most.
+const MOST_APART: u32 = 16;
+/// Steps that are tried, of the one asked for.
+const STEPS: [f32; 3] = [1.0, 2.0, 4.0];
+
+/// Tells its random numbers from those of the passes at rest.
+const STREAM: u32 = 2;
+
+/// A frame's time, and what of it is left for the device by encoding and by whoever else works here.
+struct Deadline {
+    frame_ms: f64,
+    device_ms: f64,
+    least: f64,
+    most: f64,
+}
+
+impl Deadline {
+    fn new(frame_ms: f64, [device_ms, least, most]: [f64; 3]) -> Self {
+        Self { frame_ms, device_ms, least, most }
+    }
+
+    /// It was not tried: a busy neighbour goes.
+    fn forget(&mut self) {
+        self.device_ms = (self.device_ms * CHANGE[1]).min(self.most);
+    }
+
+    /// The last frame took so long.
+    fn learn(&mut self, took_ms: f64) {
+        let change = (self.frame_ms / took_ms.max(1.0)).clamp(CHANGE[0], CHANGE[1]);
+        self.device_ms = (self.device_ms * change).clamp(self.least, self.most);
+    }
+}
+
+/// What is known while a camera moves.
+pub(super) struct Motion {
+    smooth: Deadline,
+    steady: Deadline,
+    /// Whether the last frame was to be smooth.
+    is_smooth: bool,
+    losses: Option<Losses>,
+}
+
+impl Motion {
+    pub fn new() -> Self {
+        Self {
+            smooth: Deadline::new(SMOOTH_MS, SMOOTH_DEVICE_MS),
+            steady: Deadline::new(STEADY_MS, STEADY_DEVICE_MS),
+            is_smooth: true,
+            losses: None,
+        }
+    }
+
+    /// The first frame of the camera before took so long.
+    pub fn learn(&mut self, frame_ms: f64) {
+        if self.is_smooth {
+            self.smooth.learn(frame_ms);
+        } else {
+            self.steady.learn(frame_ms);
+            self.smooth.forget();
+        }
+    }
+
+    /// Learns what the parts of a picture are worth, from one of a single sample a pixel: of more, places within steps average out what the step
+    /// loses.
+    pub fn see(&mut self, film: &Film) {
+        self.losses = Losses::of(film).or(self.losses);
+    }
+
+    /// What is lowered of a picture of so many rays that take `ray_ms` each, and what its longer step loses: what loses the least of all
+    /// that is in time; nothing where the whole is. Of unknown losses all are alike.
+    pub fn least(&mut self, rays: f64, ray_ms: f64, stepless: bool) -> (Lowered, f64) {
+        self.is_smooth = true;
+        if rays * ray_ms <= self.smooth.device_ms {
+            return (Lowered::default(), 0.0);
+        }
+        let unknown = Losses { resolution: 1.0, step: (!stepless).then_some(1.0) };
+        let losses = self.losses.unwrap_or(unknown);
+        let mut lowered = losses.least(rays, ray_ms, self.smooth.device_ms);
+        self.is_smooth =
+            losses.of_lowered(lowered) <= MOST_LOSS && rays * ray_ms * lowered.cost() <= self.smooth.device_ms;
+        if !self.is_smooth {
+            lowered = losses.least(rays, ray_ms, self.steady.device_ms);
+        }
+        (lowered, losses.of_step(lowered.step))
+    }
+}
+
+impl Lowered {
+    /// The part of the time that is left, as it was measured on two scans, lit and not: rays that are further apart have less in common, and
+    /// longer steps share what a ray costs besides.
+    fn cost(&self) -> f64 {
+        f64::from(self.apart).powf(-1.4) * f64::from(self.step).powf(-0.7)
+    }
+}
+
+/// What less of each would cost the picture, relative, as the last one at rest shows it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Losses {
+    /// Half the resolution.
+    resolution: f64,
+    /// Twice the step; none where the step plays no part.
+    step: Option<f64>,
+}
+
+impl Losses {
+    /// Of a whole picture of a single sample a pixel.
+    fn of(film: &Film) -> Option<Self> {
+        let is_whole = film.main.count == 1 && film.lowered.is_none();
+        is_whole.then(|| Self { resolution: film.resolution_loss(), step: film.step_loss_seen() })
+    }
+
+    /// What is lost; edges are assumed of the pixels.
+    fn of_lowered(&self, lowered: Lowered) -> f64 {
+        let pixels = self.resolution * f64::from(lowered.apart - 1);
+        pixels.hypot(self.of_step(lowered.step))
+    }
+
+    /// What a longer step alone loses: midpoints are of second order.
+    fn of_step(&self, step: f32) -> f64 {
+        self.step.unwrap_or(0.0) * (f64::from(step * step) - 1.0) / 3.0
+    }
+
+    /// What is lowered of a picture of so many rays that take `ray_ms` each: what loses least of all that is in time; nothing where nothing
+    /// need be.
+    fn least(&self, rays: f64, ray_ms: f64, device_ms: f64) -> Lowered {
+        let steps = if self.step.is_some() { &STEPS[..] } else { &STEPS[..1] };
+        let all = (1..=MOST_APART).flat_map(|apart| steps.iter().map(move |step| Lowered { apart, step: *step }));
+        let cost = |l: &Lowered| rays * ray_ms * l.cost();
+        let in_time = all.clone().filter(|l| cost(l) <= device_ms);
+        let least = in_time.min_by(|a, b| self.of_lowered(*a).total_cmp(&self.of_lowered(*b)));
+        least.or_else(|| all.min_by(|a, b| cost(a).total_cmp(&cost(b)))).unwrap_or_default()
+    }
+}
+
+/// The first picture of a camera, where all of it would be late.
+pub(super) struct Moving {
+    pub layer: Layer,
+    pub lowered: Lowered,
+    /// What its longer step loses, relative.
+    pub step_loss: f64,
+}
+
+impl Moving {
+    /// Room for it; that of the camera `before` where it is as large.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Internal`] when the device has none.
+    pub fn new(
+        context: &DeviceContext,
+        scene: &Scene,
+        table: Rc<Buffer>,
+        step: f32,
+        lowered: Lowered,
+        step_loss: f64,
+        before: Option<Self>,
+    ) -> Result<Self> {
+        let layer = match before {
+            Some(Self { mut layer, lowered: same, .. }) if same == lowered && layer.step == lowered.step * step => {
+                layer.restart(&context.device)?;
+                layer
+            }
+            _ => {
+                let room = before.map(|b| b.layer.buffer);
+                Layer::new(&context.device, scene, table, lowered.apart as usize, STREAM, lowered.step * step, room)?
+            }
+        };
+        Ok(Self { layer, lowered, step_loss })
+    }
+
+    /// What a ray of the whole picture takes, where that has so many and a pass took `pass_ms`.
+    pub fn ray_ms(&self, pass_ms: f64, rays: usize) -> f64 {
+        pass_ms / rays as f64 / self.lowered.cost()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_matters_least_is_lowered_and_no_more_than_need_be() {
+        let losses = Losses { resolution: 0.02, step: Some(0.001) };
+        // 100 rays of a millisecond for 40: a step of four times leaves 38 and loses 0.5 %.
+        assert_eq!(losses.least(100.0, 1.0, 40.0), Lowered { apart: 1, step: 4.0 });
+        assert_eq!(losses.least(100.0, 0.2, 30.0), Lowered { apart: 1, step: 1.0 });
+        // 2 % of every second pixel against 10 % and more of a longer step.
+        let rough = Losses { resolution: 0.02, step: Some(0.1) };
+        assert_eq!(rough.least(100.0, 1.0, 40.0), Lowered { apart: 2, step: 1.0 });
+        let stepless = Losses { resolution: 0.02, step: None };
+        assert_eq!(stepless.least(200.0, 1.0, 30.0), Lowered { apart: 4, step: 1.0 });
+        // Nothing is in time: the cheapest that there is.
+        assert_eq!(losses.least(1e9, 1.0, 30.0), Lowered { apart: MOST_APART, step: 4.0 });
+    }
+
+    /// Motion that knows what the parts of a picture are worth.
+    fn motion(losses: Losses) -> Motion {
+        Motion { losses: Some(losses), ..Motion::new() }
+    }
+
+    #[test]
+    fn frames_that_come_late_leave_the_device_less() {
+        let mut motion = motion(Losses { resolution: 0.001, step: None });
+        let first = motion.least(1e6, 1e-4, true).0;
+        (0..5).for_each(|_| motion.learn(90.0));
+        assert!(motion.least(1e6, 1e-4, true).0.apart > first.apart);
+        (0..100).for_each(|_| motion.learn(5.0));
+        assert!(motion.least(1e6, 1e-4, true).0.apart <= first.apart);
+        assert!(motion.least(1e4, 1e-4, true).0.is_none(), "what is in time as it is stays as it is");
+    }
+
+    #[test]
+    fn a_motion_is_smooth_where_little_is_lost_and_else_steady() {
+        // 30 ms of rays for 13 ms: a step of four times.
+        let mut gentle = motion(Losses { resolution: 0.5, step: Some(0.01) });
+        let (lowered, loss) = gentle.least(3e5, 1e-4, false);
+        assert_eq!(lowered, Lowered { apart: 1, step: 4.0 });
+        assert!((loss - 0.05).abs() < 1e-12);
+        assert!(gentle.is_smooth);
+        // A step of twice would do for 20 ms, and lose 20 %: all of it, 30 times a second.
+        let mut rough = motion(Losses { resolution: 0.5, step: Some(0.2) });
+        assert_eq!(rough.least(2e5, 1e-4, false), (Lowered::default(), 0.0));
+        assert!(!rough.is_smooth);
+        // What is not known is not risked either.
+        let mut unknown = Motion::new();
+        assert_eq!(unknown.least(2e5, 1e-4, false).0, Lowered::default());
+    }
+}

@@ -1,0 +1,50 @@
+//! When a render stops: what comes after a pass.
+
+use std::time::Instant;
+
+use super::context::DeviceContext;
+use super::view_run::ViewRun;
+use crate::error::Result;
+use crate::film::is_round;
+use crate::technique::Random;
+
+/// What comes after a pass.
+pub(super) enum Next {
+    GoOn,
+    /// Start over with half the step.
+    Refine,
+    /// Stop, and why.
+    Stop(&'static str),
+}
+
+/// Decides what comes after a pass. The error is looked at after 2, 3, 4, 6, 8, 12, … samples, a fixed order, so that the same
+/// request stops at the same sample. Where the step, not the noise, keeps the error above what was asked for, the step is
+/// halved; where nothing is left to halve, the render stops and says so.
+pub(super) fn next(view: &mut ViewRun, started: Instant, context: &DeviceContext) -> Result<Next> {
+    let (samples, budget) = (view.samples(), view.scene().budget());
+    if samples >= budget.samples {
+        return Ok(Next::Stop("samples"));
+    }
+    if budget.time_ms.is_some_and(|ms| started.elapsed().as_millis() >= u128::from(ms)) {
+        return Ok(Next::Stop("time"));
+    }
+    let enough = samples >= if view.is_random() { Random::LEAST_SAMPLES } else { 2 };
+    let Some(most) = budget.max_error.filter(|_| enough && is_round(samples)) else { return Ok(Next::GoOn) };
+    let error = view.gathered.develop(context)?.error();
+    let noise = error.noise.unwrap_or(0.0);
+    let bias = (error.total.powi(2) - noise.powi(2)).max(0.0).sqrt();
+    if error.total <= most {
+        Ok(Next::Stop("error"))
+    } else if bias > 0.7 * most && samples >= 4 && noise < bias {
+        let by_step = error.discretisation.unwrap_or(0.0) > 0.5 * bias && view.can_halve_step();
+        Ok(if by_step {
+            Next::Refine
+        } else if noise < 0.1 * bias {
+            Next::Stop("floor")
+        } else {
+            Next::GoOn
+        })
+    } else {
+        Ok(Next::GoOn)
+    }
+}

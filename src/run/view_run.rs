@@ -1,0 +1,305 @@
+//! A view on the device: its buffers and the order of its passes.
+//!
+//! First the control: every eighth pixel, more of a small picture, at twice the step, which is also the first picture. The passes
+//! proper follow, and the control gets another sample each time their number has doubled, so that it always costs little and knows
+//! enough; where nothing but the step tells the two apart, it gets one for each.
+
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::Duration;
+
+use serde_json::Value;
+
+use super::context::DeviceContext;
+use super::device_volume::DeviceVolume;
+use super::distances::distances;
+use super::gathered::{Gathered, Pass};
+use super::motion::{Motion, Moving};
+use super::sample_offsets::sample_offset;
+use super::warnings::warnings;
+use crate::device::structs::View as DeviceView;
+use crate::device::{Buffer, SliceLength};
+use crate::error::Result;
+use crate::render::Scene;
+use crate::scene;
+use crate::technique::{Random, ViewPlan};
+use crate::volume::Volume;
+
+/// The shortest step that `max_error` leads to, in voxels: the shortest that a request may ask for.
+const LEAST_STEP_VOXELS: f64 = 0.05;
+/// A pass in shorter slices does not tell how fast its kernel is: each waits for its longest rays.
+const TELLING_SLICE: Duration = Duration::from_millis(10);
+/// A picture is not shown before its first pass where that is likely to take less than this.
+const QUICK_MS: f64 = 50.0;
+
+/// A view at work.
+pub(super) struct ViewRun {
+    scene: Scene,
+    /// What is looked at, and the same on the device.
+    looked_at: Arc<Volume>,
+    volume: Rc<DeviceVolume>,
+    plan: ViewPlan,
+    /// What the kernel is told of the cells, where that is not their ranges.
+    distances: Option<Rc<Buffer>>,
+    parameters: Buffer,
+    view_buffer: Buffer,
+    /// The camera and image, and the same with the pass under way.
+    view: DeviceView,
+    pass_view: DeviceView,
+    pub gathered: Gathered,
+    /// What a ray of the step asked for takes, where it was last seen in motion, ms.
+    ray_ms: Option<f64>,
+    pass: Option<Pass>,
+    cursor: usize,
+    slice_length: SliceLength,
+    /// Whether the first pass is likely to be over before a picture of the control could be seen.
+    quick: bool,
+    pass_time: Duration,
+    /// The shortest slice of the pass under way.
+    shortest_slice: Duration,
+    /// The longest way through the volume, world units.
+    longest: f64,
+    least_step: f32,
+    random: Option<Random>,
+    /// Device time since the start.
+    pub device_time: Duration,
+}
+
+impl ViewRun {
+    /// Begins what `plan` says, whose kernel is built; in the memory of what was gathered `before`.
+    pub fn new(
+        context: &mut DeviceContext,
+        scene: Scene,
+        looked_at: Arc<Volume>,
+        mut plan: ViewPlan,
+        before: Option<Gathered>,
+    ) -> Result<Self> {
+        let volume = &looked_at;
+        let on_device = context.volume(volume)?;
+        let distances = distances(context, &on_device, volume, &mut plan)?;
+        let view = Self::view(&scene, volume);
+        let table = |step| on_device.table(&context.device, &scene, volume, step);
+        let tables = [table(2.0 * plan.step)?, table(plan.step)?];
+        let gathered = Gathered::new(context, &scene, tables, &plan, is_paired(&view), before)?;
+        let device = &context.device;
+        let parameters = device.upload(&scene.view().parameters(volume, scene.camera())?, 0)?;
+        let view_buffer = device.allocate(size_of::<DeviceView>())?;
+        let (pass, cursor, device_time) = (None, 0, Duration::ZERO);
+        let longest = 2.0 * scene::radius(volume);
+        let speed = context.speed(&plan.variant);
+        let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
+        Ok(Self {
+            slice_length: SliceLength::new(context.device.info(), longest / f64::from(plan.step), speed),
+            quick: quick(speed, gathered.size),
+            pass_time: Duration::ZERO,
+            shortest_slice: Duration::MAX,
+            longest,
+            least_step: (LEAST_STEP_VOXELS * smallest) as f32,
+            random: scene.view().random(),
+            plan,
+            scene,
+            looked_at,
+            volume: on_device,
+            distances,
+            parameters,
+            view_buffer,
+            view,
+            pass_view: view,
+            gathered,
+            ray_ms: None,
+            pass,
+            cursor,
+            device_time,
+        })
+    }
+
+    /// What all passes are told.
+    fn view(scene: &Scene, volume: &Volume) -> DeviceView {
+        let mut view = scene.camera().device_view(scene.image(), scene.region().left_top, volume);
+        view.full_width = scene.image()[0] as i32;
+        view.seed = [scene.seed() as u32, (scene.seed() >> 32) as u32];
+        scene.clip().apply(volume, &mut view);
+        scene.view().set_shared(scene.camera(), &mut view);
+        view
+    }
+
+    /// Another camera: everything gathered so far is of the old one.
+    pub fn restart(&mut self, context: &mut DeviceContext, scene: &Scene) -> Result<()> {
+        self.scene = scene.clone();
+        let volume = &*self.looked_at;
+        self.view = Self::view(scene, volume);
+        context.device.write(&mut self.parameters, 0, &scene.view().parameters(volume, scene.camera())?)?;
+        let speed = context.speed(&self.plan.variant);
+        self.slice_length = SliceLength::new(context.device.info(), self.longest / f64::from(self.plan.step), speed);
+        self.quick = quick(speed, self.gathered.size);
+        self.gathered.restart(context)?;
+        (self.pass, self.cursor, self.device_time) = (None, 0, Duration::ZERO);
+        Ok(())
+    }
+
+    /// Samples per pixel of the passes proper.
+    pub fn samples(&self) -> u32 {
+        self.gathered.samples()
+    }
+
+    /// Whether no pass is under way: all pixels have as many samples as it says.
+    pub fn is_between_passes(&self) -> bool {
+        self.pass.is_none()
+    }
+
+    /// Whether a picture of the control is not worth showing.
+    pub fn is_quick(&self) -> bool {
+        self.quick
+    }
+
+    /// Whether the step is still longer than what a request may ask for.
+    pub fn can_halve_step(&self) -> bool {
+        self.plan.step >= 2.0 * self.least_step
+    }
+
+    /// Starts over with half the step: what was gathered has the error of the longer one. The passes proper of the longer step
+    /// would make a good control, but for their number; a fresh one costs an eighth of a pass.
+    pub fn halve_step(&mut self, context: &DeviceContext) -> Result<()> {
+        self.plan.step *= 0.5;
+        self.gathered.moving = None;
+        self.gathered.will_change();
+        self.slice_length = SliceLength::new(context.device.info(), self.longest / f64::from(self.plan.step), None);
+        for (layer, step) in self.gathered.layers.iter_mut().zip([2.0 * self.plan.step, self.plan.step]) {
+            (layer.samples, layer.step) = (0, step);
+            layer.table = self.volume.table(&context.device, &self.scene, &self.looked_at, step)?;
+        }
+        (self.pass, self.cursor) = (None, 0);
+        self.gathered.rounds.forget();
+        Ok(())
+    }
+
+    pub fn plan(&self) -> &ViewPlan {
+        &self.plan
+    }
+
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// True if its samples are random.
+    pub fn is_random(&self) -> bool {
+        self.random.is_some()
+    }
+
+    /// What a reader should know of the volume and of the parameters on it.
+    pub fn warnings(&self) -> Vec<Value> {
+        warnings(&self.looked_at, &self.scene)
+    }
+
+    /// The camera moves: where all of the picture would be late, the first frame has less of what loses the least.
+    pub fn hurry(&mut self, context: &DeviceContext, motion: &mut Motion) -> Result<()> {
+        let rays = (self.gathered.size[0] * self.gathered.size[1]) as f64;
+        let ray_ms = self.ray_ms.or_else(|| context.speed(&self.plan.variant).map(f64::recip));
+        let known = ray_ms.map(|ray_ms| motion.least(rays, ray_ms, self.plan.stepless));
+        let (lowered, step_loss) = known.unwrap_or_default();
+        let step = self.plan.step;
+        self.gathered.will_change();
+        let before = self.gathered.moving.take();
+        if !lowered.is_none() {
+            let table = self.volume.table(&context.device, &self.scene, &self.looked_at, lowered.step * step)?;
+            self.gathered.moving = Some(Moving::new(context, &self.scene, table, step, lowered, step_loss, before)?);
+        }
+        Ok(())
+    }
+
+    /// Whether a picture is there that was made to be in time.
+    pub fn has_hurried(&self) -> bool {
+        self.gathered.moving.as_ref().is_some_and(|m| m.layer.samples > 0)
+    }
+
+    /// Works for about `slice` and says which pass it finished, if one.
+    pub fn slice(&mut self, context: &mut DeviceContext, slice: Duration) -> Result<Option<Pass>> {
+        let pass = match self.pass {
+            Some(pass) => pass,
+            None => self.begin(context)?,
+        };
+        let layer = self.gathered.layer(pass);
+        let (beams, rays) = layer.items(context.device.info().lanes as usize);
+        let items = self.slice_length.items(context.device.info(), slice, rays).min(beams - self.cursor);
+        self.pass_view.first_beam = self.cursor as i32;
+        context.device.write(&mut self.view_buffer, 0, bytemuck::bytes_of(&self.pass_view))?;
+        let layer = self.gathered.layer(pass);
+        let cells = match &self.distances {
+            Some(distances) => ("distances", &**distances),
+            None => ("ranges", &self.volume.cells.ranges),
+        };
+        let mut arguments = vec![
+            ("view", &self.view_buffer),
+            ("params", &self.parameters),
+            ("voxels", &self.volume.voxels),
+            cells,
+            ("table", &*layer.table),
+            ("film", &layer.buffer),
+            ("counts", &self.gathered.counts),
+        ];
+        arguments.extend(layer.tiles().map(|tiles| ("tiles", tiles)));
+        let took = context.device.run(&self.plan.variant, &arguments, items)?;
+        self.slice_length.learn(items, rays, took);
+        self.device_time += took;
+        self.pass_time += took;
+        self.shortest_slice = self.shortest_slice.min(slice);
+        self.cursor += items;
+        if self.cursor < beams {
+            return Ok(None);
+        }
+        if let (Pass::Moving, Some(moving)) = (pass, &self.gathered.moving) {
+            let [width, height] = self.gathered.size;
+            self.ray_ms = Some(moving.ray_ms(self.pass_time.as_secs_f64() * 1e3, width * height));
+        }
+        if pass == Pass::Main {
+            self.ray_ms = None;
+            let [width, height] = self.gathered.size;
+            if self.shortest_slice >= TELLING_SLICE {
+                context.measured(&self.plan.variant, width * height, self.pass_time);
+            }
+        }
+        self.gathered.layer_mut(pass).passed();
+        (self.pass, self.cursor) = (None, 0);
+        // Samples that were put where the error is have no halves.
+        if pass == Pass::Main && !self.random.is_some_and(|r| r.adaptive) {
+            self.gathered.keep_round(context, self.device_time)?;
+        }
+        Ok(Some(pass))
+    }
+
+    /// Chooses the next pass.
+    fn begin(&mut self, context: &DeviceContext) -> Result<Pass> {
+        self.gathered.will_change();
+        let pass = self.gathered.next_pass();
+        let adaptive = pass == Pass::Main && self.random.is_some_and(|r| r.adaptive);
+        self.gathered.layer_mut(pass).choose_tiles(context, adaptive)?;
+        if pass == Pass::Main && self.samples() == 0 {
+            // What is counted is of the picture, not of its preview.
+            context.device.write(&mut self.gathered.counts, 0, &[0; 32])?;
+        }
+        let layer = self.gathered.layer(pass);
+        let view = DeviceView {
+            width: layer.width as i32,
+            height: layer.height as i32,
+            stride: layer.apart as i32,
+            sample: layer.samples as i32,
+            stream: layer.stream,
+            offset: sample_offset(layer.samples).to_array(),
+            step: layer.step,
+            ..self.view
+        };
+        self.pass_view = view;
+        self.pass = Some(pass);
+        (self.pass_time, self.shortest_slice) = (Duration::ZERO, Duration::MAX);
+        Ok(pass)
+    }
+}
+
+/// Whether a sample of the control differs from the one of its number in the passes proper by its step alone.
+fn is_paired(view: &DeviceView) -> bool {
+    view.jittered == 0
+}
+
+fn quick(speed: Option<f64>, [width, height]: [usize; 2]) -> bool {
+    speed.is_some_and(|per_ms| (width * height) as f64 / per_ms < QUICK_MS)
+}

@@ -1,0 +1,51 @@
+//! Building a kernel for real: PoCL compiles at the first launch, so each is launched once on nothing.
+
+use std::path::PathBuf;
+
+use super::sources::source_of;
+use crate::device::program::Variant;
+use crate::device::{Buffer, Device, Parameter};
+use crate::error::Result;
+use crate::volume::Voxels;
+
+/// Builds a variant and launches it once on nothing.
+///
+/// # Errors
+/// [`Error::Internal`] with the build log.
+pub(super) fn warm(device: &mut Device, variant: &Variant) -> Result<()> {
+    if device.is_built(variant) {
+        return Ok(());
+    }
+    let source = source_of(variant)?;
+    device.build(&source, variant)?;
+    // Zeroed buffers ask for an image of no pixels or a launch of no histories: compiled, and nothing done.
+    let zero = |parameter: &Parameter| -> Result<Buffer> {
+        if parameter.is_volume && device.info().volumes_are_images {
+            device.upload_image(&Voxels::U8(vec![0]), [1; 3])
+        } else {
+            device.upload(&[0; 1024], 0)
+        }
+    };
+    let parameters = device.parameters(variant)?;
+    let buffers: Vec<Buffer> = parameters.iter().map(zero).collect::<Result<_>>()?;
+    let arguments: Vec<(&str, &Buffer)> = parameters.iter().map(|p| p.name.as_str()).zip(&buffers).collect();
+    device.run(variant, &arguments, 1)?;
+    // A note beside what PoCL keeps; without it the variant is compiled again, which finds it there.
+    if let Some(note) = note(device, variant) {
+        drop(note.parent().map(std::fs::create_dir_all));
+        drop(std::fs::write(note, variant.label()));
+    }
+    Ok(())
+}
+
+/// Where it is noted that PoCL's cache has a variant: in the cache's own folder, so that both go together.
+fn note(device: &Device, variant: &Variant) -> Option<PathBuf> {
+    let cache = std::env::var_os("POCL_CACHE_DIR").filter(|_| device.info().is_pocl())?;
+    let source = source_of(variant).ok()?;
+    Some(PathBuf::from(cache).join("cloudchamber").join(device.fingerprint(&source, variant).ok()?))
+}
+
+/// Whether PoCL's cache has a variant.
+pub(super) fn is_cached(device: &Device, variant: &Variant) -> bool {
+    note(device, variant).is_some_and(|note| note.exists())
+}

@@ -1,0 +1,122 @@
+//! The service in one object: the engine, the stored volumes, the limits and the planner, with one way to submit a render. HTTP, the
+//! command line, the study and the tests all use it.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use serde_json::Value;
+
+use crate::config::Limits;
+use crate::device::DeviceConfig;
+use crate::error::{Error, Result};
+use crate::job::{CancelOnDrop, Engine, Job, Place, State};
+use crate::plan::{Calibrations, Planner};
+use crate::render::Scene;
+use crate::run::DeviceExecutor;
+use crate::volume::Store;
+
+/// A handle on the service; clones share it.
+#[derive(Clone)]
+pub struct Service {
+    shared: Arc<Shared>,
+}
+
+struct Shared {
+    engine: Engine,
+    store: Store,
+    limits: Limits,
+    calibrations: Calibrations,
+}
+
+/// A valid request that holds a place in the queue.
+pub struct Prepared {
+    place: Place,
+    request: Value,
+    scene: Scene,
+    planned: Option<Value>,
+}
+
+impl Service {
+    /// Opens the store in `data_dir` and starts the engine. Must be called within a tokio runtime.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] when the folder cannot be used or no thread can be started.
+    pub fn start(device: DeviceConfig, data_dir: &Path, limits: Limits) -> Result<Self> {
+        let store = Store::open(&data_dir.join("volumes"), limits.store())?;
+        let engine = Engine::new(DeviceExecutor::start(device, &limits)?, limits.clone());
+        let calibrations = Calibrations::kept_in(data_dir);
+        Ok(Self { shared: Arc::new(Shared { engine, store, limits, calibrations }) })
+    }
+
+    /// The engine.
+    pub fn engine(&self) -> &Engine {
+        &self.shared.engine
+    }
+
+    /// The stored volumes.
+    pub fn store(&self) -> &Store {
+        &self.shared.store
+    }
+
+    /// The limits.
+    pub fn limits(&self) -> &Limits {
+        &self.shared.limits
+    }
+
+    /// The planner.
+    pub fn planner(&self) -> Planner<'_> {
+        let Shared { engine, store, limits, calibrations } = &*self.shared;
+        Planner { engine, store, limits, calibrations }
+    }
+
+    /// The scene of a request whose technique is a view's. It loads the volume, so it may block for a while.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] with JSON pointers and permitted ranges.
+    pub fn scene(&self, request: &Value) -> Result<Scene> {
+        Scene::from_json(request, self.store(), self.limits())
+    }
+
+    /// Plans a request where its technique is `auto`, takes a place in the queue, checks the request and loads its volume.
+    ///
+    /// # Errors
+    /// Those of the planner, of [`Engine::reserve`] and of [`Service::scene`].
+    pub async fn prepare(&self, request: Value) -> Result<Prepared> {
+        let (request, planned) = self.planner().resolve(request).await?;
+        // A place in the queue before anything is loaded for the request.
+        let place = self.engine().reserve()?;
+        // The runtime's own threads must not wait until a volume is decoded or a built-in is made.
+        let service = self.clone();
+        let loaded = tokio::task::spawn_blocking(move || service.scene(&request).map(|scene| (request, scene))).await;
+        let (request, scene) = loaded.map_err(Error::internal)??;
+        Ok(Prepared { place, request, scene, planned })
+    }
+
+    /// Queues a prepared request.
+    pub fn queue(&self, prepared: Prepared) -> Arc<Job> {
+        let Prepared { place, request, scene, planned } = prepared;
+        self.engine().submit(place, request, scene, planned)
+    }
+
+    /// Prepares a request and queues it.
+    ///
+    /// # Errors
+    /// As [`Service::prepare`].
+    pub async fn submit(&self, request: Value) -> Result<Arc<Job>> {
+        Ok(self.queue(self.prepare(request).await?))
+    }
+
+    /// Submits a request and waits for its end. It is cancelled when this future is dropped.
+    ///
+    /// # Errors
+    /// As [`Service::prepare`], and what the render failed by.
+    pub async fn submit_and_wait(&self, request: Value) -> Result<Arc<Job>> {
+        let guard = CancelOnDrop::new(self.engine(), self.submit(request).await?);
+        let job = guard.job();
+        job.watch().wait_for(|u| u.state.is_terminal()).await.map(drop).map_err(Error::internal)?;
+        match job.state() {
+            State::Done => Ok(job.clone()),
+            _ => Err(job.failure().unwrap_or_else(|| Error::Conflict("the render was cancelled".into()))),
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! The simulation on the device: its grid fills in batches of photons, and a look is due each time their number has doubled.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use super::Simulation;
+use super::device::FieldPass;
+use super::plan::DevicePlan;
+use super::report::Ledgers;
+use crate::device::{Buffer, Device, DeviceInfo, SliceLength};
+use crate::error::Result;
+use crate::technique::{Look, Process, Progress, Step};
+use crate::volume::Volume;
+
+/// Batches of equal size: enough for the standard errors of the ledger, and a power of two for the doublings.
+const BATCHES: u64 = 32;
+/// Looks that are due while the grid fills, each time the batches have doubled, besides the last.
+pub const LOOKS_ON_THE_WAY: u32 = BATCHES.ilog2();
+
+/// Photons of a work-item where items are many: enough that launching an item does not count.
+const PHOTONS_PER_ITEM: usize = 32;
+/// Times that an item with a grid of its own comes for photons, if all are as fast: so that none works long after the others.
+const SHARES_PER_ITEM: u64 = 64;
+/// The grids of all items together take at most this.
+const OWN_GRIDS_BYTES: usize = 1 << 27;
+
+/// How many items work at a time with a grid each, where lanes say that the device is a CPU and the grids fit.
+fn own_grids(info: &DeviceInfo, cells: usize) -> Option<usize> {
+    let items = info.compute_units as usize;
+    (info.lanes > 1 && 8 * cells * items <= OWN_GRIDS_BYTES).then_some(items)
+}
+
+/// A simulation at work.
+pub(super) struct Run {
+    simulation: Arc<Simulation>,
+    plan: DevicePlan,
+    table: Buffer,
+    parameters: Buffer,
+    pass: Buffer,
+    grid: Buffer,
+    /// How many items have a grid of their own; none where one is shared.
+    grids: Option<usize>,
+    ledger: Buffer,
+    /// The ledger's sums after the last batch, and what each batch added.
+    ledger_before: Vec<u64>,
+    ledgers: Vec<Vec<u64>>,
+    /// Photons that are done, and those that make the whole.
+    done: u64,
+    total: u64,
+    slice_length: SliceLength,
+    device_time: Duration,
+}
+
+impl Run {
+    /// Room for a simulation whose kernel is built.
+    pub fn new(device: &Device, simulation: Arc<Simulation>) -> Result<Self> {
+        let plan = simulation.device_plan()?;
+        let grids = own_grids(device.info(), plan.cells);
+        Ok(Self {
+            table: device.upload(bytemuck::cast_slice(&plan.table), 8)?,
+            parameters: device.upload(&plan.parameters, 0)?,
+            pass: device.allocate(size_of::<FieldPass>())?,
+            grid: device.upload(&vec![0; 8 * plan.cells * grids.unwrap_or(1)], 0)?,
+            grids,
+            // Behind the ledger is the number of photons that items have taken.
+            ledger: device.upload(&vec![0; 8 * (plan.ledger + 1)], 0)?,
+            ledger_before: vec![0; plan.ledger],
+            ledgers: Vec::new(),
+            done: 0,
+            total: simulation.parameters.photons,
+            slice_length: SliceLength::new(device.info(), 1.0, None),
+            device_time: Duration::ZERO,
+            simulation,
+            plan,
+        })
+    }
+
+    /// The first photon after batch `batch`.
+    fn batch_end(&self, batch: usize) -> u64 {
+        let batches = BATCHES.min(self.total);
+        (u128::from(self.total) * (batch as u128 + 1) / u128::from(batches)) as u64
+    }
+
+    fn progress(&self) -> Progress {
+        Progress { of: "photons", done: self.done, total: self.total }
+    }
+
+    fn close_batch(&mut self, device: &Device) -> Result<()> {
+        let mut sums = vec![0u64; self.plan.ledger];
+        device.read(&self.ledger, 0, &mut sums)?;
+        let added = sums.iter().zip(&self.ledger_before).map(|(now, before)| now.wrapping_sub(*before)).collect();
+        self.ledgers.push(added);
+        self.ledger_before = sums;
+        Ok(())
+    }
+
+    /// Launches photons for about `slice`, up to the end of the batch at `end`.
+    fn launch(&mut self, device: &Device, slice: Duration, end: u64) -> Result<Duration> {
+        let info = device.info();
+        let (stride, wanted) = match self.grids {
+            // A few items that take photons as long as there are any: their lanes are refilled until the last.
+            Some(grids) => (info.local_size, grids),
+            None => (1, self.slice_length.items(info, slice, PHOTONS_PER_ITEM)),
+        };
+        let fits = self.slice_length.items(info, slice, 1) as u64;
+        let count = fits.max(wanted as u64).min(end - self.done);
+        let shares = wanted as u64 * if self.grids.is_some() { SHARES_PER_ITEM } else { 1 };
+        let per_item = count.div_ceil(shares).max(u64::from(info.lanes));
+        let seed = self.simulation.parameters.seed;
+        let pass = FieldPass {
+            first: [self.done as u32, (self.done >> 32) as u32],
+            count: count as u32,
+            per_item: per_item as u32,
+            stride: stride as u32,
+            own_grids: self.grids.is_some().into(),
+            taken_at: self.plan.ledger as i32,
+            seed: [seed as u32, (seed >> 32) as u32],
+        };
+        device.write(&mut self.pass, 0, bytemuck::bytes_of(&pass))?;
+        device.write(&mut self.ledger, 8 * self.plan.ledger, &[0; 8])?;
+        let items = wanted.min(count.div_ceil(per_item) as usize) * stride;
+        let arguments = [
+            ("pass", &self.pass),
+            ("params", &self.parameters),
+            ("table", &self.table),
+            ("grid", &self.grid),
+            ("ledger", &self.ledger),
+        ];
+        let took = device.run(&self.plan.variant, &arguments, items)?;
+        self.slice_length.learn(count as usize, 1, took);
+        self.device_time += took;
+        self.done += count;
+        Ok(took)
+    }
+}
+
+impl Process for Run {
+    fn step(&mut self, device: &mut Device, slice: Duration) -> Result<Step> {
+        let end = self.batch_end(self.ledgers.len());
+        let device_time = self.launch(device, slice, end)?;
+        let ends_batch = self.done >= end;
+        if ends_batch {
+            self.close_batch(device)?;
+        }
+        let is_look_due = ends_batch && self.ledgers.len().is_power_of_two();
+        Ok(Step { progress: self.progress(), device_time, is_look_due })
+    }
+
+    fn stop(&mut self, device: &mut Device) -> Result<()> {
+        self.close_batch(device)
+    }
+
+    fn look(&mut self, device: &mut Device) -> Result<Look> {
+        let mut grid = vec![0u64; self.plan.cells * self.grids.unwrap_or(1)];
+        device.read(&self.grid, 0, &mut grid)?;
+        let (sums, others) = grid.split_at_mut(self.plan.cells);
+        for own in others.chunks_exact(self.plan.cells) {
+            sums.iter_mut().zip(own).for_each(|(sum, v)| *sum = sum.wrapping_add(*v));
+        }
+        grid.truncate(self.plan.cells);
+        let volume = Volume::new(self.simulation.grid(&grid, self.done))?;
+        let mut result = self.simulation.report(&Ledgers::new(&self.ledgers, self.done), &grid);
+        let ms = 1e3 * self.device_time.as_secs_f64().max(1e-9);
+        result["photons_per_ms"] = (self.done as f64 / ms).into();
+        Ok(Look { volume: Arc::new(volume), result })
+    }
+}

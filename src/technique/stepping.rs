@@ -1,0 +1,70 @@
+//! What the planner may choose of views that sample along their rays: steps, and levels of the volume.
+
+use std::sync::Arc;
+
+use serde_json::{Value, json};
+
+use super::view::{Open, Setting, Settings, View};
+
+/// Steps that are tried, sides of the smallest voxel, and that of the reference.
+const STEPS: [f64; 4] = [0.25, 0.5, 1.0, 2.0];
+const SHORTEST: f64 = 0.125;
+/// Those that are tried at a coarser level, sides of its smallest voxel.
+const COARSER_STEPS: [f64; 2] = [1.0, 2.0];
+
+/// A way to make the picture besides its step.
+pub(super) struct Way<P> {
+    /// What is said of it behind the step.
+    pub words: &'static str,
+    /// The parameter that it changes, as a request has it.
+    pub change: Option<(&'static str, Value)>,
+    /// The parameters.
+    pub parameters: P,
+}
+
+impl<P: Clone> Way<P> {
+    /// The parameters as they are given.
+    pub fn as_given(parameters: &P) -> Self {
+        Self { words: "", change: None, parameters: parameters.clone() }
+    }
+}
+
+/// The settings of a view that samples along its rays: steps, at the volume's levels, in each of some `ways`. `with_step` gives a way's
+/// parameters a step in sides of the smallest voxel. None where the request gives the step.
+pub(super) fn stepping<P>(
+    technique: &'static str,
+    open: &Open<'_>,
+    ways: &[Way<P>],
+    with_step: impl Fn(&P, f64) -> Arc<dyn View>,
+) -> Option<Settings> {
+    let as_given = &ways.first().filter(|_| open.leaves("step_voxels"))?.parameters;
+    let of_step = |step: f64| vec![("step_voxels", json!(step))];
+    let mut all = vec![Setting {
+        view: Some(with_step(as_given, SHORTEST)),
+        changes: of_step(SHORTEST),
+        ..Setting::as_given(technique, format!("{technique}, the shortest step"))
+    }];
+    let coarser = open.levels.iter().map(|level| (Some(*level), &COARSER_STEPS[..]));
+    let levels: Vec<_> = [(None, &STEPS[..])].into_iter().chain(coarser).collect();
+    for Way { words: way, change, parameters } in ways {
+        let mut finer: Option<String> = None;
+        for (level, steps) in &levels {
+            // What the next finer level leaves out with its shortest step, this one does.
+            let (mut less, first) = (finer, all.len());
+            for &step in *steps {
+                let of_level = level.map_or(String::new(), |l| format!(" of level {l}"));
+                let words = format!("{technique}, step of {step} voxels{of_level}{way}");
+                all.push(Setting {
+                    view: Some(with_step(parameters, step)),
+                    changes: of_step(step).into_iter().chain(change.clone()).collect(),
+                    level: *level,
+                    unbiased: false,
+                    less: less.replace(words.clone()).into_iter().collect(),
+                    ..Setting::as_given(technique, words)
+                });
+            }
+            finer = Some(all[first].words.clone());
+        }
+    }
+    Some(Settings { all, ruled_out: Vec::new() })
+}
