@@ -8,6 +8,7 @@
 #include "shared/lanes.h"
 #include "shared/optical.h"
 #include "shared/packet.h"
+#include "shared/resume.h"
 #include "shared/shade.h"
 #include "shared/style.h"
 #include "shared/volume.h"
@@ -254,10 +255,41 @@ static inline void march(constant const View *view, constant const EmissionAbsor
     *radiance = r;
 }
 
+// What a beam leaves to the next launch; its step and the packets that go on are in the header.
+typedef struct { Radiance r[PACKETS]; } BeamState;
+STATE_IS(BeamState, RADIANCE_STATE_WORDS);
+
+static inline void save(global uint *state, global uint *header, int k, int going, const Radiance *r) {
+    global BeamState *s = (global BeamState *)(header + RESUME_HEADER);
+    for (int i = 0; i < PACKETS; i++) s->r[i] = r[i];
+    header[1] = (uint)k, header[2] = (uint)going;
+    has_more(state, header);
+}
+
+static inline void restore(global const uint *header, int *k, int *going, Radiance *r) {
+    global const BeamState *s = (global const BeamState *)(header + RESUME_HEADER);
+    for (int i = 0; i < PACKETS; i++) r[i] = s->r[i];
+    *k = (int)header[1], *going = (int)header[2];
+}
+
+// The packets that go on at step k, a bit each.
+static inline int packets_going(constant const View *view, constant const EmissionAbsorption *params, const Packet *packets, const Radiance *r, int k) {
+    int going = 0;
+    for (int i = 0; i < PACKETS; i++) {
+        Mask on = MASK(r[i].transmittance > params->transmittance_floor) & MASK(packets[i].ray.t_far > (float)k * view->step);
+        going |= any_lane(on) ? 1 << i : 0;
+    }
+    return going;
+}
+
 kernel void emission_absorption(constant View *view, constant EmissionAbsorption *params, VOLUME voxels,
-                                global const uchar *distances, global const uchar *table, global float *film, global uint *counts) {
+                                global const uchar *distances, global const uchar *table, global float *film, global uint *counts,
+                                global uint *state) {
     int number = view->first_beam + (int)get_global_id(0);
     if (number >= beams(view)) return;
+    global uint *header = resume_header(state, (uint)get_global_id(0), RADIANCE_STATE_WORDS);
+    if (view->resumed && header[0] == 0u) return;
+    uint left = steps_left(view->most_steps);
     Packet packets[PACKETS];
     Radiance r[PACKETS];
     Beam beam = beam_at(view, number, INNER_MARGIN, packets);
@@ -268,12 +300,18 @@ kernel void emission_absorption(constant View *view, constant EmissionAbsorption
         half_ways(view, ray_world(view, packets[i].x, packets[i].y), packets[i].half_way);
 #endif
     }
+    int k = BACK_TO_FRONT ? beam.end - 1 : beam.begin, going = (1 << PACKETS) - 1;
+    if (view->resumed) restore(header, &k, &going, r);
+    if (view->most_steps) header[0] = 0u;
 #if BACK_TO_FRONT
-    for (int k = beam.end - 1; k >= beam.begin; k--)
+    for (; k >= beam.begin && left; left -= min(left, (uint)PACKETS), k--)
         for (int i = 0; i < PACKETS; i++) march(view, params, voxels, table, &packets[i], k, k + 1, &r[i]);
+    if (k >= beam.begin) {
+        save(state, header, k, going, r);
+        return;
+    }
 #else
-    int going = (1 << PACKETS) - 1;
-    for (int k = beam.begin; k < beam.end && going;) {
+    for (; k < beam.end && going && left; left -= min(left, (uint)(PACKETS * STRIDE))) {
         int leap = beam_leap(view, &beam, distances, k);
         k += leap;
         if (leap > 0) continue;
@@ -281,11 +319,11 @@ kernel void emission_absorption(constant View *view, constant EmissionAbsorption
         for (int i = 0; i < PACKETS; i++)
             if (going >> i & 1) march(view, params, voxels, table, &packets[i], k, end, &r[i]);
         k = end;
-        going = 0;
-        for (int i = 0; i < PACKETS; i++) {
-            Mask on = MASK(r[i].transmittance > params->transmittance_floor) & MASK(packets[i].ray.t_far > (float)k * view->step);
-            going |= any_lane(on) ? 1 << i : 0;
-        }
+        going = packets_going(view, params, packets, r, k);
+    }
+    if (k < beam.end && going) {
+        save(state, header, k, going, r);
+        return;
     }
 #endif
     for (int i = 0; i < PACKETS; i++) {

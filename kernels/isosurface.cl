@@ -9,6 +9,7 @@
 #include "shared/inner.h"
 #include "shared/lanes.h"
 #include "shared/packet.h"
+#include "shared/resume.h"
 #include "shared/shade.h"
 #include "shared/volume.h"
 
@@ -154,19 +155,63 @@ static inline void show(constant const View *view, constant const Isosurface *pa
     film_packet(view, film, counts, p->column, p->row, colour, alpha);
 }
 
+// What a beam leaves to the next launch; its step, the packets that go on, and those whose last value is not known are in the header.
+#if LAYERED
+typedef struct { Real ahead; Real3 colour; Real transmittance; } PacketState;
+#else
+typedef struct { Real ahead; Mask on; Bracket found; } PacketState;
+#endif
+typedef struct { PacketState packets[PACKETS]; } BeamState;
+STATE_IS(BeamState, SEARCH_STATE_WORDS);
+
+static inline void save(global uint *state, global uint *header, int k, int going, const Search *searches) {
+    global BeamState *s = (global BeamState *)(header + RESUME_HEADER);
+    uint fresh = 0u;
+    for (int i = 0; i < PACKETS; i++) {
+        s->packets[i].ahead = searches[i].ahead;
+        fresh |= searches[i].fresh ? 1u << i : 0u;
+#if LAYERED
+        s->packets[i].colour = searches[i].colour, s->packets[i].transmittance = searches[i].transmittance;
+#else
+        s->packets[i].on = searches[i].on, s->packets[i].found = searches[i].found;
+#endif
+    }
+    header[1] = (uint)k, header[2] = (uint)going, header[3] = fresh;
+    has_more(state, header);
+}
+
+static inline void restore(global const uint *header, int *k, int *going, Search *searches) {
+    global const BeamState *s = (global const BeamState *)(header + RESUME_HEADER);
+    for (int i = 0; i < PACKETS; i++) {
+        searches[i].ahead = s->packets[i].ahead;
+        searches[i].fresh = (int)(header[3] >> i & 1u);
+#if LAYERED
+        searches[i].colour = s->packets[i].colour, searches[i].transmittance = s->packets[i].transmittance;
+#else
+        searches[i].on = s->packets[i].on, searches[i].found = s->packets[i].found;
+#endif
+    }
+    *k = (int)header[1], *going = (int)header[2];
+}
+
 kernel void isosurface(constant View *view, constant Isosurface *params, VOLUME voxels, global const uchar *distances,
-                       global const uchar *table, global float *film, global uint *counts) {
+                       global const uchar *table, global float *film, global uint *counts, global uint *state) {
     int number = view->first_beam + (int)get_global_id(0);
     if (number >= beams(view)) return;
+    global uint *header = resume_header(state, (uint)get_global_id(0), SEARCH_STATE_WORDS);
+    if (view->resumed && header[0] == 0u) return;
+    uint left = steps_left(view->most_steps);
     Packet packets[PACKETS];
     Search searches[PACKETS];
     Beam beam = beam_at(view, number, INNER_MARGIN, packets);
-    int going = 0;
+    int k = beam.begin, going = 0;
     for (int i = 0; i < PACKETS; i++) {
         searches[i] = search_start();
-        going |= goes_on(view, params, &packets[i], &searches[i], beam.begin) ? 1 << i : 0;
+        going |= goes_on(view, params, &packets[i], &searches[i], k) ? 1 << i : 0;
     }
-    for (int k = beam.begin; k < beam.end && going;) {
+    if (view->resumed) restore(header, &k, &going, searches);
+    if (view->most_steps) header[0] = 0u;
+    for (; k < beam.end && going && left; left -= min(left, (uint)(PACKETS * STRIDE))) {
         int leap = beam_leap(view, &beam, distances, k);
         if (leap > 0) {
             k += leap;
@@ -180,6 +225,10 @@ kernel void isosurface(constant View *view, constant Isosurface *params, VOLUME 
             if (!goes_on(view, params, &packets[i], &searches[i], end)) going &= ~(1 << i);
         }
         k = end;
+    }
+    if (k < beam.end && going) {
+        save(state, header, k, going, searches);
+        return;
     }
     for (int i = 0; i < PACKETS; i++) show(view, params, voxels, film, counts, &packets[i], &searches[i]);
 }

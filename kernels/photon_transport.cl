@@ -13,6 +13,7 @@
 #include "shared/phase.h"
 #include "shared/photon.h"
 #include "shared/queue.h"
+#include "shared/resume.h"
 #include "shared/rng.h"
 #include "shared/tally.h"
 
@@ -245,11 +246,30 @@ static inline Mask faults_of(constant const PhotonTransport *params, global ulon
 }
 
 // The state of the packet is variables of their own, not one struct: with sums in it, which are indexed in memory, it was 4 % slower.
+// What a work-item leaves to the next launch; its queue is in the header.
+typedef struct { Photon photon; Int steps; Mask alive; } PhotonState;
+STATE_IS(PhotonState, PHOTON_STATE_WORDS);
+
+static inline void save(global uint *state, global uint *header, const Queue *q, const Photon *photon, Int steps, Mask alive) {
+    global PhotonState *s = (global PhotonState *)(header + RESUME_HEADER);
+    s->photon = *photon, s->steps = steps, s->alive = alive;
+    header[1] = q->next, header[2] = q->end, header[3] = q->more;
+    has_more(state, header);
+}
+
+static inline void restore(global const uint *header, Queue *q, Photon *photon, Int *steps, Mask *alive) {
+    global const PhotonState *s = (global const PhotonState *)(header + RESUME_HEADER);
+    *photon = s->photon, *steps = s->steps, *alive = s->alive;
+    q->next = header[1], q->end = header[2], q->more = header[3];
+}
+
 kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport *params, global const float *table, global ulong *grid,
-                             global ulong *ledger) {
+                             global ulong *ledger, global uint *state) {
     if (get_global_id(0) % pass->stride != 0) return;
-    uint item = (uint)get_global_id(0) / pass->stride;
+    uint item = (uint)get_global_id(0) / pass->stride, left = pass->most_steps;
     if ((ulong)item * pass->per_item >= pass->count) return;
+    global uint *header = resume_header(state, item, PHOTON_STATE_WORDS);
+    if (pass->resumed && header[0] == 0u) return;
     int voxels = params->grid[0] * params->grid[1] * params->grid[2];
     Grid sums = grid_at(grid + (pass->own_grids ? (size_t)item * voxels : 0), pass->own_grids, voxels);
     Gains gains = no_gains();
@@ -259,6 +279,8 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
     draws.number = draws.event = ~(UInt)(0u);
     Int steps = (Int)(0);
     Mask alive = (Mask)(0);
+    if (pass->resumed) restore(header, &queue, &photon, &steps, &alive);
+    header[0] = 0u;
     for (;;) {
         if (queue.next == queue.end && queue.more) take_share(pass, ledger, &queue);
         if (queue.next < queue.end && is_launch_due(count_lanes(~alive), &queue))
@@ -273,8 +295,10 @@ kernel void photon_transport(constant FieldPass *pass, constant PhotonTransport 
         steps += 1, queue.passed++;
         alive &= ~gone & (goes_on | ~step.hit);
         alive &= ~faults_of(params, ledger, alive, steps, &photon, &gains);
+        if (--left == 0u) break;
     }
     if (sums.own) grid_flush(&sums);
-    gain_path(params, &photon, (Mask)(-1), &gains);
+    if (left == 0u) save(state, header, &queue, &photon, steps, alive);
+    else gain_path(params, &photon, (Mask)(-1), &gains);
     gains_flush(ledger, &gains);
 }

@@ -6,6 +6,7 @@
 #include "shared/inner.h"
 #include "shared/lanes.h"
 #include "shared/packet.h"
+#include "shared/resume.h"
 #include "shared/volume.h"
 #include "shared/walk.h"
 #include "shared/window.h"
@@ -92,45 +93,68 @@ static inline void take_steps(constant const View *view, constant const Projecti
         }
     }
 }
+
+// Takes the samples of the parts of a beam from step `begin` on, the part with the greatest bound first, until no part is left that could
+// show more. `least` is what a part has to exceed to be of use to a packet.
+static inline void take_parts(constant const View *view, constant const Projection *params, VOLUME voxels, global const uchar *ranges,
+                              const Beam *beam, const Packet *packets, int begin, float *least, Real *best) {
+    float bound[PARTS];
+    int parts = min((beam->end - begin + PART - 1) / PART, PARTS);
+    for (int i = 0; i < parts; i++) {
+        int first = begin + i * PART;
+        bound[i] = params->skipping ? part_bound(view, params, ranges, beam, first, min(first + PART, beam->end) - 1) : INFINITY;
+    }
+    for (int done = 0; done < parts; done++) {
+        int next = 0;
+        for (int i = 1; i < parts; i++) next = bound[i] > bound[next] ? i : next;
+        float wanted = least[0];
+        for (int i = 1; i < PACKETS; i++) wanted = fmin(wanted, least[i]);
+        if (!(bound[next] > wanted)) break;
+        int first = begin + next * PART, last = min(first + PART, beam->end);
+        for (int i = 0; i < PACKETS; i++) {
+            if (!(bound[next] > least[i])) continue;
+            take_steps(view, params, voxels, &packets[i], first, last, &best[i]);
+            Mask misses = MASK(!(packets[i].ray.t_far > packets[i].ray.t_near));
+            least[i] = least_lane(select(best[i], (Real)(INFINITY), misses));
+        }
+        bound[next] = -INFINITY;
+    }
+}
 #endif
 
+// What a beam leaves to the next launch, if it is not walked; its step is in the header.
+typedef struct { Real best[PACKETS]; } BeamState;
+STATE_IS(BeamState, PROJECTION_BEAM_STATE_WORDS);
+
 kernel void projection(constant View *view, constant Projection *params, VOLUME voxels, global const uchar *ranges,
-                       global const uchar *table, global float *film, global uint *counts) {
+                       global const uchar *table, global float *film, global uint *counts, global uint *state) {
     int number = view->first_beam + (int)get_global_id(0);
     if (number >= beams(view)) return;
+    global uint *header = resume_header(state, (uint)get_global_id(0), PROJECTION_BEAM_STATE_WORDS);
+    if (view->resumed && header[0] == 0u) return;
     Packet packets[PACKETS];
     Beam beam = beam_at(view, number, INNER_MARGIN, packets);
+    if (view->most_steps) header[0] = 0u;
 #if WALKED
     for (int i = 0; i < PACKETS; i++) project(view, params, voxels, table, film, counts, &packets[i]);
 #else
+    global BeamState *saved = (global BeamState *)(header + RESUME_HEADER);
     Real best[PACKETS];
-    float least[PACKETS]; // what a part has to exceed to be of use to a packet
+    float least[PACKETS];
     for (int i = 0; i < PACKETS; i++) {
-        best[i] = (Real)(-INFINITY);
-        least[i] = any_lane(MASK(packets[i].ray.t_far > packets[i].ray.t_near)) ? -INFINITY : INFINITY;
+        best[i] = view->resumed ? saved->best[i] : (Real)(-INFINITY);
+        Mask misses = MASK(!(packets[i].ray.t_far > packets[i].ray.t_near));
+        least[i] = least_lane(select(best[i], (Real)(INFINITY), misses));
     }
-    for (int begin = beam.begin; begin < beam.end; begin += PARTS * PART) {
-        float bound[PARTS];
-        int parts = min((beam.end - begin + PART - 1) / PART, PARTS);
-        for (int i = 0; i < parts; i++) {
-            int first = begin + i * PART;
-            bound[i] = params->skipping ? part_bound(view, params, ranges, &beam, first, min(first + PART, beam.end) - 1) : INFINITY;
-        }
-        for (int done = 0; done < parts; done++) {
-            int next = 0;
-            for (int i = 1; i < parts; i++) next = bound[i] > bound[next] ? i : next;
-            float wanted = least[0];
-            for (int i = 1; i < PACKETS; i++) wanted = fmin(wanted, least[i]);
-            if (!(bound[next] > wanted)) break;
-            int first = begin + next * PART, last = min(first + PART, beam.end);
-            for (int i = 0; i < PACKETS; i++) {
-                if (!(bound[next] > least[i])) continue;
-                take_steps(view, params, voxels, &packets[i], first, last, &best[i]);
-                Mask misses = MASK(!(packets[i].ray.t_far > packets[i].ray.t_near));
-                least[i] = least_lane(select(best[i], (Real)(INFINITY), misses));
-            }
-            bound[next] = -INFINITY;
-        }
+    uint left = steps_left(view->most_steps);
+    int k = view->resumed ? (int)header[1] : beam.begin;
+    for (; k < beam.end && left; left -= min(left, (uint)(PACKETS * PARTS * PART)), k += PARTS * PART)
+        take_parts(view, params, voxels, ranges, &beam, packets, k, least, best);
+    if (k < beam.end) {
+        for (int i = 0; i < PACKETS; i++) saved->best[i] = best[i];
+        header[1] = (uint)k;
+        has_more(state, header);
+        return;
     }
     for (int i = 0; i < PACKETS; i++) {
         Mask shown = MASK(best[i] > -INFINITY);

@@ -11,6 +11,7 @@
 #include "shared/light.h"
 #include "shared/path_film.h"
 #include "shared/phase.h"
+#include "shared/resume.h"
 #include "shared/rng.h"
 #include "shared/tile.h"
 #include "shared/tracker.h"
@@ -195,8 +196,27 @@ static inline void arrive(constant const Scattering *params, global const float 
     if (!(params->sky && params->sky_visible)) s->alpha = select(s->alpha, 1.0f - (arrives.x + arrives.y + arrives.z) * (1.0f / 3.0f), first);
 }
 
+// What a tile leaves to the next launch; the pixels that it has taken are in the header.
+typedef struct { Sample s; Mask alive; } TileState;
+STATE_IS(TileState, SCATTERING_STATE_WORDS);
+
+static inline void save(global uint *state, global uint *header, const Sample *s, Mask alive, int taken) {
+    global TileState *t = (global TileState *)(header + RESUME_HEADER);
+    t->s = *s, t->alive = alive;
+    header[1] = (uint)taken;
+    has_more(state, header);
+}
+
+static inline void restore(global const uint *header, Sample *s, Mask *alive, int *taken) {
+    global const TileState *t = (global const TileState *)(header + RESUME_HEADER);
+    *s = t->s, *alive = t->alive;
+    *taken = (int)header[1];
+}
+
 kernel void single_scatter(constant View *view, constant Scattering *params, VOLUME voxels, global const uchar *ranges, global const float *table,
-                           global float *film, global uint *counts, global uint *tiles) {
+                           global float *film, global uint *counts, global uint *tiles, global uint *state) {
+    global uint *header = resume_header(state, (uint)get_global_id(0), SCATTERING_STATE_WORDS);
+    if (view->resumed && header[0] == 0u) return;
     Tile tile = tile_at(view, tiles);
     Sample s;
     Flight *f = &s.flight;
@@ -208,8 +228,10 @@ kernel void single_scatter(constant View *view, constant Scattering *params, VOL
     s.met = (Mask)(0);
     Mask alive = (Mask)(0);
     int taken = 0;
-    uint steps = 0u;
-    while (f->sample < tile.sample + tile.times) {
+    uint steps = 0u, left = steps_left(view->most_steps);
+    if (view->resumed) restore(header, &s, &alive, &taken);
+    if (view->most_steps) header[0] = 0u;
+    while (f->sample < tile.sample + tile.times && left) {
         if (taken < ITEM * ITEM && count_lanes(~alive) >= REFILL) {
             Int column, row;
             Mask fresh = take_pixels(view, tile, alive, &taken, &column, &row);
@@ -223,7 +245,7 @@ kernel void single_scatter(constant View *view, constant Scattering *params, VOL
         Mask over;
         Int face;
         UInt4Lanes r;
-        steps++;
+        steps++, left--;
         Mask real = fly(view, params, voxels, ranges, counts, alive, f, &r, &over, &face);
         if (any_lane(real)) collide(params, table, real, &s);
         if (any_lane(over)) arrive(params, table, over, &s);
@@ -237,4 +259,5 @@ kernel void single_scatter(constant View *view, constant Scattering *params, VOL
         }
     }
     cost(tiles, tile, steps);
+    if (f->sample < tile.sample + tile.times) save(state, header, &s, alive, taken);
 }

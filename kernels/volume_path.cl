@@ -9,6 +9,7 @@
 #include "shared/light.h"
 #include "shared/path_film.h"
 #include "shared/phase.h"
+#include "shared/resume.h"
 #include "shared/rng.h"
 #include "shared/surface.h"
 #include "shared/tile.h"
@@ -147,8 +148,27 @@ static inline Mask arrive(constant const View *view, constant const Scattering *
     return out;
 }
 
+// What a tile leaves to the next launch; the pixels that it has taken are in the header.
+typedef struct { Path path; Mask alive; } TileState;
+STATE_IS(TileState, SCATTERING_STATE_WORDS);
+
+static inline void save(global uint *state, global uint *header, const Path *path, Mask alive, int taken) {
+    global TileState *t = (global TileState *)(header + RESUME_HEADER);
+    t->path = *path, t->alive = alive;
+    header[1] = (uint)taken;
+    has_more(state, header);
+}
+
+static inline void restore(global const uint *header, Path *path, Mask *alive, int *taken) {
+    global const TileState *t = (global const TileState *)(header + RESUME_HEADER);
+    *path = t->path, *alive = t->alive;
+    *taken = (int)header[1];
+}
+
 kernel void volume_path(constant View *view, constant Scattering *params, VOLUME voxels, global const uchar *ranges, global const float *table,
-                        global float *film, global uint *counts, global uint *tiles) {
+                        global float *film, global uint *counts, global uint *tiles, global uint *state) {
+    global uint *header = resume_header(state, (uint)get_global_id(0), SCATTERING_STATE_WORDS);
+    if (view->resumed && header[0] == 0u) return;
     Tile tile = tile_at(view, tiles);
     Path path;
     Flight *f = &path.flight;
@@ -159,8 +179,10 @@ kernel void volume_path(constant View *view, constant Scattering *params, VOLUME
     path.alpha = path.density = path.t_from = path.next_depth = zero;
     Mask alive = (Mask)(0);
     int taken = 0;
-    uint steps = 0u;
-    while (f->sample < tile.sample + tile.times) {
+    uint steps = 0u, left = steps_left(view->most_steps);
+    if (view->resumed) restore(header, &path, &alive, &taken);
+    if (view->most_steps) header[0] = 0u;
+    while (f->sample < tile.sample + tile.times && left) {
         Mask done = (Mask)(0);
         if (taken < ITEM * ITEM && count_lanes(~alive) >= REFILL) {
             Int column, row;
@@ -175,7 +197,7 @@ kernel void volume_path(constant View *view, constant Scattering *params, VOLUME
         Mask over, elsewhere = (Mask)(0);
         Int face;
         UInt4Lanes r;
-        steps++;
+        steps++, left--;
         Mask real = fly(view, params, voxels, ranges, counts, alive & ~done, f, &r, &over, &face);
         if (any_lane(real)) done |= scatter(view, params, table, r, real, &path, &elsewhere);
         if (any_lane(over)) done |= arrive(view, params, table, over, face, &path, &elsewhere);
@@ -191,4 +213,5 @@ kernel void volume_path(constant View *view, constant Scattering *params, VOLUME
         }
     }
     cost(tiles, tile, steps);
+    if (f->sample < tile.sample + tile.times) save(state, header, &path, alive, taken);
 }

@@ -11,6 +11,7 @@ mod common;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use cloudchamber::device::DeviceConfig;
 use cloudchamber::render::{self, Subject};
 use cloudchamber::technique;
 use common::engine::House;
@@ -96,6 +97,31 @@ fn made(asked: &Asked, house: &House) -> (Picture, [Vec<u8>; 2]) {
 fn committed(name: &str) -> Result<Picture, String> {
     let [exr, png] = files(name).map(|file| std::fs::read(&file).map_err(|e| format!("{}: {e}", file.display())));
     Ok(Picture::read(&exr?, &png?))
+}
+
+/// Work that no launch finishes at once comes to the same as if one did.
+#[test]
+fn launches_of_a_few_steps_make_the_same_pictures() {
+    let cut = House::on(DeviceConfig { first_steps: 64, ..DeviceConfig::pocl() });
+    let names = [
+        "composite_u8",
+        "composite_back_to_front",
+        "surface_u8",
+        "surfaces_f32",
+        "maximum_f32_b_spline",
+        "single_f32_all_lights",
+        "path_u16_weighted_colours",
+        "photons_chamber",
+        "photons_labels_by_collisions",
+        "photons_gamma",
+    ];
+    let list = pictures::list();
+    for name in names {
+        let asked = list.iter().find(|a| a.name == name).unwrap_or_else(|| panic!("{name} is not in the list"));
+        let film = |house: &House| house.film(&pictures::with_volumes(&asked.request, house)).0;
+        let (whole, cut) = (film(House::shared()), film(&cut));
+        assert!(whole.main.mean == cut.main.mean && whole.main.m2 == cut.main.m2, "{name}: another picture");
+    }
 }
 
 #[test]

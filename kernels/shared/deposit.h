@@ -53,6 +53,9 @@ static inline void deposit(constant const PhotonTransport *params, Grid *grid, I
 }
 
 #if !VOXEL_CELLS
+// Voxels that are outside of the grid on the side that the flight goes to.
+static inline Mask beyond(Int voxel, Int up, int voxels) { return select(MASK(voxel < 0), MASK(voxel >= voxels), MASK(up != 0)); }
+
 // Shares a straight flight out among the voxels that it crosses: weight times length, times the absorption for absorbed energy.
 static inline void deposit_track(constant const PhotonTransport *params, global const float *table, Grid *grid, Real3 p, Real3 d,
                                  Real length, Real weight, Mask on) {
@@ -81,7 +84,8 @@ static inline void deposit_track(constant const PhotonTransport *params, global 
         Mask in_x = on & MASK(tx <= to), in_y = on & MASK(ty <= to), in_z = on & MASK(tz <= to);
         x += select((Int)(0), up_x + up_x - 1, in_x), y += select((Int)(0), up_y + up_y - 1, in_y), z += select((Int)(0), up_z + up_z - 1, in_z);
         t = select(t, to, on);
-        on &= MASK(to < length);
+        // A straight flight that has left the grid does not come back.
+        on &= MASK(to < length) & ~(beyond(x, up_x, params->grid[0]) | beyond(y, up_y, params->grid[1]) | beyond(z, up_z, params->grid[2]));
     }
 }
 #endif

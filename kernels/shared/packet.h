@@ -117,8 +117,9 @@ static inline Beam beam_at(constant const View *view, int number, float margin, 
     Beam b;
     b.begin = b.end = 0;
     if (!(far > near)) return b;
-    b.begin = (int)floor(near / view->step);
-    b.end = (int)ceil(far / view->step);
+    // Steps are counted in an int. Nobody waits for so many.
+    b.begin = (int)floor(clamp(near / view->step, -1e9f, 1e9f));
+    b.end = (int)ceil(clamp(far / view->step, -1e9f, 1e9f));
     RealLanes v;
     Real farthest;
     #define MIDDLE(to, first, last) v.v = 0.5f * (first + last); to = 0.5f * (v.lane[0] + v.lane[LANES - 1])

@@ -10,6 +10,7 @@ mod include;
 mod launch;
 mod level;
 pub mod program;
+mod resume;
 mod select;
 mod signature;
 mod slice_length;
@@ -27,6 +28,7 @@ use opencl3::program::Program;
 use opencl3::types::{CL_BLOCKING, cl_uchar};
 
 pub use launch::Range;
+pub use resume::Resume;
 pub use select::{DeviceInfo, NO_DEVICE, list, select};
 pub use signature::Parameter;
 pub use slice_length::SliceLength;
@@ -35,6 +37,8 @@ use crate::error::{Error, Result};
 use launch::Built;
 use program::{Source, Variant};
 
+/// Steps of a work-item in the first launch: a few milliseconds of any kernel.
+const FIRST_STEPS: u32 = 1 << 14;
 /// Uploads below so many bytes are copied where their padding is added.
 const SMALL: usize = 1 << 20;
 
@@ -51,6 +55,8 @@ pub struct DeviceConfig {
     pub images: Option<bool>,
     /// True if a compiler's warning fails a build: in tests. In service it would take a technique away for nothing.
     pub strict: bool,
+    /// Steps that a work-item may take in the first launch; tests ask for few, so that launches leave something undone.
+    pub first_steps: u32,
     /// This program, which compiles kernels ahead in processes of its own where it is given; else each is built when first used.
     pub compiler: Option<PathBuf>,
 }
@@ -58,7 +64,15 @@ pub struct DeviceConfig {
 impl DeviceConfig {
     /// The CPU's PoCL with what it likes; each kernel is built when first used.
     pub fn pocl() -> Self {
-        Self { wish: "pocl".into(), lanes: None, kernels: None, images: None, strict: false, compiler: None }
+        Self {
+            wish: "pocl".into(),
+            lanes: None,
+            kernels: None,
+            images: None,
+            strict: false,
+            first_steps: FIRST_STEPS,
+            compiler: None,
+        }
     }
 }
 
@@ -94,6 +108,7 @@ pub struct Device {
     kernels: HashMap<Variant, Built>,
     overrides: Option<PathBuf>,
     strict: bool,
+    first_steps: u32,
 }
 
 fn cl<T>(doing: &str, result: std::result::Result<T, opencl3::error_codes::ClError>) -> Result<T> {
@@ -154,8 +169,8 @@ impl Device {
         // The 1.x form: PoCL 3.1 and NVIDIA's OpenCL both have it.
         let queue = cl("creating the queue", CommandQueue::create_default(&context, 0))?;
         info.image_formats_3d = images::formats(&context);
-        let (kernels, strict) = (HashMap::new(), config.strict);
-        let mut device = Self { info, id: device.id(), context, queue, kernels, overrides: None, strict };
+        let (kernels, strict, first_steps) = (HashMap::new(), config.strict, config.first_steps);
+        let mut device = Self { info, id: device.id(), context, queue, kernels, overrides: None, strict, first_steps };
         device.info.level = level::of(&mut device)?;
         device.overrides = config.kernels.clone();
         Ok(device)
@@ -164,6 +179,11 @@ impl Device {
     /// The description of the device.
     pub fn info(&self) -> &DeviceInfo {
         &self.info
+    }
+
+    /// Steps that a work-item may take in the first launch.
+    pub fn first_steps(&self) -> u32 {
+        self.first_steps
     }
 
     /// Lets the device say what was given up before it was opened so.

@@ -103,6 +103,10 @@ device_struct! {
         pub stride: i32,
         /// Number of the first beam of this launch.
         pub first_beam: i32,
+        /// Steps that a work-item may take in this launch; 0 where none takes so many.
+        pub most_steps: u32,
+        /// 1 if the work-items go on with what the launch before has left.
+        pub resumed: i32,
         /// Number of the sample in its film, from 0.
         pub sample: i32,
         /// The film's number: each film has random numbers of its own.

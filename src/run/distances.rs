@@ -33,7 +33,8 @@ pub(super) fn distances(
         })
         .collect();
     // Catmull-Rom's weights sum to 1 and their magnitudes to at most 1.25 along an axis: (1.25³ − 1) / 2 of the range.
-    let overshoot = if plan.variant.features.contains(&("INTERPOLATION", Interpolation::CatmullRom.code())) { 0.477 } else { 0.0 };
+    let overshoot =
+        if plan.variant.features.contains(&("INTERPOLATION", Interpolation::CatmullRom.code())) { 0.477 } else { 0.0 };
     let distances = on_device.distances(&mut context.device, &intervals, overshoot)?;
     plan.reasons.push(format!("{} of {} macro-cells are empty under it", distances.empty, wide * high * deep));
     Ok(Some(distances.buffer))

@@ -8,7 +8,7 @@ use serde_json::Value;
 use super::context::DeviceContext;
 use crate::error::Result;
 use crate::film::Film;
-use crate::technique::{Field, Process};
+use crate::technique::{Field, Process, Step};
 use crate::volume::Volume;
 
 /// A field at work.
@@ -48,12 +48,12 @@ impl FieldRun {
         self.is_over
     }
 
-    /// Works for about `slice`; `true` when a look is due.
-    pub fn step(&mut self, context: &mut DeviceContext, slice: Duration) -> Result<bool> {
+    /// Works for about `slice`.
+    pub fn step(&mut self, context: &mut DeviceContext, slice: Duration) -> Result<Step> {
         let step = self.process.step(&mut context.device, slice)?;
         self.device_time += step.device_time;
         self.is_over = step.progress.is_over();
-        Ok(step.is_look_due || self.is_over)
+        Ok(step)
     }
 
     /// Ends the process with what there is.

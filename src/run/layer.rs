@@ -143,3 +143,9 @@ fn beam_pixels(lanes: usize) -> [usize; 2] {
         _ => [1, 1],
     }
 }
+
+/// Packets of a work-item: `PACKETS` of `kernels/shared/packet.h`.
+pub(super) fn packets_of_beam(lanes: usize) -> usize {
+    let [width, height] = beam_pixels(lanes);
+    width * height / lanes
+}

@@ -156,13 +156,13 @@ impl Live {
 
     fn field_turn(&mut self, context: &mut DeviceContext) -> Result<Turn> {
         let (Some(field), Some(camera)) = (&mut self.field, &self.camera) else { return Ok(Turn::Over) };
-        let mut is_due = field.step(context, FIELD_SLICE)?;
+        let step = field.step(context, FIELD_SLICE)?;
         let time = camera.scene.budget().time_ms;
-        if time.is_some_and(|ms| self.started.elapsed().as_millis() >= u128::from(ms)) {
+        let is_late = time.is_some_and(|ms| self.started.elapsed().as_millis() >= u128::from(ms)) && step.is_whole;
+        if is_late {
             field.stop(context)?;
-            is_due = true;
         }
-        if is_due {
+        if step.is_look_due || field.is_over() {
             let volume = field.look(context)?;
             self.job.set_field(&volume, field.is_over(), 1e3 * field.device_time.as_secs_f64());
             self.begin_view(context, volume)?;

@@ -14,11 +14,12 @@ use super::context::DeviceContext;
 use super::device_volume::DeviceVolume;
 use super::distances::distances;
 use super::gathered::{Gathered, Pass};
+use super::layer::packets_of_beam;
 use super::motion::{Motion, Moving};
 use super::sample_offsets::sample_offset;
 use super::warnings::warnings;
 use crate::device::structs::View as DeviceView;
-use crate::device::{Buffer, SliceLength};
+use crate::device::{Buffer, Device, Resume, SliceLength};
 use crate::error::Result;
 use crate::render::Scene;
 use crate::scene;
@@ -29,6 +30,8 @@ use crate::volume::Volume;
 const LEAST_STEP_VOXELS: f64 = 0.05;
 /// A pass in shorter slices does not tell how fast its kernel is: each waits for its longest rays.
 const TELLING_SLICE: Duration = Duration::from_millis(10);
+/// A beam has as many packets at most: rays of so many times fewer steps than a work-item may take are not bounded.
+const PACKETS: u32 = 4;
 /// A picture is not shown before its first pass where that is likely to take less than this.
 const QUICK_MS: f64 = 50.0;
 
@@ -51,6 +54,10 @@ pub(super) struct ViewRun {
     ray_ms: Option<f64>,
     pass: Option<Pass>,
     cursor: usize,
+    /// What launches leave undone, where they are bounded in steps.
+    resume: Resume,
+    /// The launch that has left something undone: its work-items, and its time so far.
+    undone: Option<(usize, Duration)>,
     slice_length: SliceLength,
     /// Whether the first pass is likely to be over before a picture of the control could be seen.
     quick: bool,
@@ -84,6 +91,8 @@ impl ViewRun {
         let device = &context.device;
         let parameters = device.upload(&scene.view().parameters(volume, scene.camera())?, 0)?;
         let view_buffer = device.allocate(size_of::<DeviceView>())?;
+        let packets = if scene.view().random().is_some() { 1 } else { packets_of_beam(device.info().lanes as usize) };
+        let resume = Resume::new(device, plan.state_words * packets)?;
         let (pass, cursor, device_time) = (None, 0, Duration::ZERO);
         let longest = 2.0 * scene::radius(volume);
         let speed = context.speed(&plan.variant);
@@ -109,6 +118,8 @@ impl ViewRun {
             ray_ms: None,
             pass,
             cursor,
+            resume,
+            undone: None,
             device_time,
         })
     }
@@ -133,7 +144,7 @@ impl ViewRun {
         self.slice_length = SliceLength::new(context.device.info(), self.longest / f64::from(self.plan.step), speed);
         self.quick = quick(speed, self.gathered.size);
         self.gathered.restart(context)?;
-        (self.pass, self.cursor, self.device_time) = (None, 0, Duration::ZERO);
+        (self.pass, self.cursor, self.undone, self.device_time) = (None, 0, None, Duration::ZERO);
         Ok(())
     }
 
@@ -168,7 +179,7 @@ impl ViewRun {
             (layer.samples, layer.step) = (0, step);
             layer.table = self.volume.table(&context.device, &self.scene, &self.looked_at, step)?;
         }
-        (self.pass, self.cursor) = (None, 0);
+        (self.pass, self.cursor, self.undone) = (None, 0, None);
         self.gathered.rounds.forget();
         Ok(())
     }
@@ -218,31 +229,20 @@ impl ViewRun {
             Some(pass) => pass,
             None => self.begin(context)?,
         };
-        let layer = self.gathered.layer(pass);
-        let (beams, rays) = layer.items(context.device.info().lanes as usize);
-        let items = self.slice_length.items(context.device.info(), slice, rays).min(beams - self.cursor);
-        self.pass_view.first_beam = self.cursor as i32;
-        context.device.write(&mut self.view_buffer, 0, bytemuck::bytes_of(&self.pass_view))?;
-        let layer = self.gathered.layer(pass);
-        let cells = match &self.distances {
-            Some(distances) => ("distances", &**distances),
-            None => ("ranges", &self.volume.cells.ranges),
+        let (beams, rays) = self.gathered.layer(pass).items(context.device.info().lanes as usize);
+        let (items, before) = match self.undone.take() {
+            Some(undone) => undone,
+            None => (self.items(&context.device, slice, rays).min(beams - self.cursor), Duration::ZERO),
         };
-        let mut arguments = vec![
-            ("view", &self.view_buffer),
-            ("params", &self.parameters),
-            ("voxels", &self.volume.voxels),
-            cells,
-            ("table", &*layer.table),
-            ("film", &layer.buffer),
-            ("counts", &self.gathered.counts),
-        ];
-        arguments.extend(layer.tiles().map(|tiles| ("tiles", tiles)));
-        let took = context.device.run(&self.plan.variant, &arguments, items)?;
-        self.slice_length.learn(items, rays, took);
+        let took = self.launch(&context.device, pass, items, slice, before > Duration::ZERO)?;
         self.device_time += took;
         self.pass_time += took;
         self.shortest_slice = self.shortest_slice.min(slice);
+        if self.is_bounded(&context.device) && self.resume.has_more() {
+            self.undone = Some((items, before + took));
+            return Ok(None);
+        }
+        self.slice_length.learn(items, rays, before + took);
         self.cursor += items;
         if self.cursor < beams {
             return Ok(None);
@@ -265,6 +265,58 @@ impl ViewRun {
             self.gathered.keep_round(context, self.device_time)?;
         }
         Ok(Some(pass))
+    }
+
+    /// Work-items of a launch for about `slice`.
+    fn items(&self, device: &Device, slice: Duration, rays: usize) -> usize {
+        let items = self.slice_length.items(device.info(), slice, rays);
+        if self.is_bounded(device) { items.min(self.resume.most_items(device)) } else { items }
+    }
+
+    /// True if a work-item may have more to do than fits in a launch: random paths, or rays of very many steps.
+    fn is_bounded(&self, device: &Device) -> bool {
+        let (steps, most) = (self.longest / f64::from(self.plan.step), f64::from(device.first_steps() / PACKETS));
+        self.plan.state_words > 0 && (self.is_random() || steps > most)
+    }
+
+    /// Runs `items` work-items of the pass, from the cursor on, or goes on with what the last launch of them has left.
+    fn launch(
+        &mut self,
+        device: &Device,
+        pass: Pass,
+        items: usize,
+        slice: Duration,
+        resumed: bool,
+    ) -> Result<Duration> {
+        let bounded = self.is_bounded(device);
+        self.pass_view.first_beam = self.cursor as i32;
+        self.pass_view.most_steps = if bounded { self.resume.steps() } else { 0 };
+        self.pass_view.resumed = resumed.into();
+        device.write(&mut self.view_buffer, 0, bytemuck::bytes_of(&self.pass_view))?;
+        if bounded {
+            self.resume.before(device, items)?;
+        }
+        let layer = self.gathered.layer(pass);
+        let cells = match &self.distances {
+            Some(distances) => ("distances", &**distances),
+            None => ("ranges", &self.volume.cells.ranges),
+        };
+        let mut arguments = vec![
+            ("view", &self.view_buffer),
+            ("params", &self.parameters),
+            ("voxels", &self.volume.voxels),
+            cells,
+            ("table", &*layer.table),
+            ("film", &layer.buffer),
+            ("counts", &self.gathered.counts),
+        ];
+        arguments.extend(layer.tiles().map(|tiles| ("tiles", tiles)));
+        arguments.extend((self.plan.state_words > 0).then(|| ("state", self.resume.state())));
+        let took = device.run(&self.plan.variant, &arguments, items)?;
+        if bounded {
+            self.resume.after(device, slice, took)?;
+        }
+        Ok(took)
     }
 
     /// Chooses the next pass.

@@ -45,6 +45,8 @@ pub struct Step {
     pub progress: Progress,
     /// Time on the device.
     pub device_time: Duration,
+    /// True if nothing is half done: the process can be stopped here.
+    pub is_whole: bool,
     /// True if the grid has become so much better that a picture of it is worth its time.
     pub is_look_due: bool,
 }

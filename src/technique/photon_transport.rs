@@ -54,15 +54,15 @@ use glam::{DAffine3, DMat3, DVec3};
 use serde_json::{Value, json};
 
 use super::{Field, Kind, Process, Technique, Work};
-use crate::device::Device;
 use crate::device::enums::{DeviceEnum, PhaseKind};
 use crate::device::program::{Source, Variant};
 use crate::device::structs::DeviceStruct;
+use crate::device::{Device, Resume};
 use crate::error::{Error, Result};
 use crate::request;
 use crate::scene::camera::Framing;
 use crate::volume::{NewVolume, Store, Voxels};
-use device::{BoundaryKind, LedgerEntry, Media, MediumNumber, SourceKind, Tally};
+use device::{BoundaryKind, LedgerEntry, Media, MediumNumber, STATE_WORDS, SourceKind, Tally};
 pub use device::{FieldPass, PhotonTransport};
 use geometry::Geometry;
 use parameters::Parameters;
@@ -102,7 +102,12 @@ fn source() -> Source {
         kernel: TECHNIQUE.name,
         structs: || {
             "#pragma OPENCL EXTENSION cl_khr_int64_base_atomics : enable\n".to_owned()
-                + &[FieldPass::opencl_text(), PhotonTransport::opencl_text()].concat()
+                + &[
+                    FieldPass::opencl_text(),
+                    PhotonTransport::opencl_text(),
+                    Resume::opencl_text("PHOTON", STATE_WORDS),
+                ]
+                .concat()
                 + &[Media::opencl_text(), MediumNumber::opencl_text(), PhaseKind::opencl_text()].concat()
                 + &[Tracking::opencl_text(), SourceKind::opencl_text(), BoundaryKind::opencl_text()].concat()
                 + &[Tally::opencl_text(), LedgerEntry::opencl_text()].concat()

@@ -31,6 +31,9 @@ pub struct ViewPlan {
     pub cells: CellUse,
     /// The step of the finest pass, world units.
     pub step: f32,
+    /// Words of a lane, for each packet of a work-item, that a launch leaves to the next (`kernels/shared/resume.h`); 0 where no launch can take
+    /// long.
+    pub state_words: usize,
     /// True if the step plays no part in the picture.
     pub stepless: bool,
     /// Past this opacity a ray ends; what it leaves out is part of the error.

@@ -29,13 +29,18 @@ pub struct House {
 impl House {
     /// A house on PoCL with so many lanes, or with what the device likes.
     pub fn new(lanes: Option<u32>) -> Self {
+        Self::on(DeviceConfig { lanes, ..DeviceConfig::pocl() })
+    }
+
+    /// A house on a device.
+    pub fn on(config: DeviceConfig) -> Self {
         static ONCE: Mutex<()> = Mutex::new(());
         let _one_at_a_time = ONCE.lock().unwrap();
         device::keep_compiled_kernels_in(&super::kernel_cache()).unwrap();
         let data = tempfile::tempdir().unwrap();
         let limits = Flags::parse_from(["test", "--keep-film-bytes", "1000000000"]).limits;
         let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().unwrap();
-        let config = DeviceConfig { lanes, kernels: super::kernels(), ..DeviceConfig::pocl() };
+        let config = DeviceConfig { kernels: super::kernels(), ..config };
         let service = runtime.block_on(async { Service::start(config, data.path(), limits) }).unwrap();
         runtime.block_on(service.engine().ready()).unwrap();
         Self { service, runtime, _data: data }

@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use super::pieces::pieces;
 use super::{EmissionAbsorption, Parameters, TECHNIQUE, regions};
+use crate::device::Resume;
 use crate::device::program::{Source, Variant, listed};
 use crate::device::structs::{DeviceStruct, View as DeviceView};
 use crate::error::Result;
@@ -17,6 +18,9 @@ use crate::technique::stepping::{Way, stepping};
 use crate::technique::steps::coarse_step;
 use crate::technique::{CellUse, Open, Settings, View, ViewPlan, view_text};
 use crate::volume::{Volume, VoxelType};
+
+/// Words of a lane that a launch leaves to the next: a packet's radiance and transmittance.
+const STATE_WORDS: usize = 4;
 
 type Features = [(&'static str, i32); 5];
 
@@ -74,7 +78,9 @@ fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
 pub(super) fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
-        structs: || view_text() + &EmissionAbsorption::opencl_text(),
+        structs: || {
+            view_text() + &EmissionAbsorption::opencl_text() + &Resume::opencl_text_of_beams("RADIANCE", STATE_WORDS)
+        },
         variants: || FEATURES.iter().flat_map(|f| VoxelType::ALL.map(|t| variant(t, f))).collect(),
         common: COMMON * VoxelType::ALL.len(),
     }
@@ -173,6 +179,7 @@ impl View for Parameters {
             variant: variant(volume.voxels().voxel_type(), self.features()?),
             cells: if skip { CellUse::Distances(opaque) } else { CellUse::None },
             step: (self.step_voxels * smallest) as f32,
+            state_words: STATE_WORDS,
             stepless: false,
             opacity_threshold: self.threshold(),
             reasons,

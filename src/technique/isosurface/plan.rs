@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use super::surfaces::{self, Surface};
 use super::{Isosurface, Normals, Output, Parameters, Sampling, TECHNIQUE};
+use crate::device::Resume;
 use crate::device::program::{Source, Variant, listed};
 use crate::device::structs::{DeviceStruct, View as DeviceView};
 use crate::error::Result;
@@ -17,6 +18,9 @@ use crate::technique::stepping::{Way, stepping};
 use crate::technique::steps::coarse_step;
 use crate::technique::{CellUse, Open, Settings, View, ViewPlan, view_text};
 use crate::volume::{Volume, VoxelType};
+
+/// Words of a lane that a launch leaves to the next: a packet's search.
+const STATE_WORDS: usize = 7;
 
 /// The tolerance of a crossing, in voxels.
 const TOLERANCE_VOXELS: f64 = 1e-4;
@@ -56,7 +60,7 @@ fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
 pub(super) fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
-        structs: || view_text() + &Isosurface::opencl_text(),
+        structs: || view_text() + &Isosurface::opencl_text() + &Resume::opencl_text_of_beams("SEARCH", STATE_WORDS),
         variants: || FEATURES.iter().flat_map(|f| VoxelType::ALL.map(|t| variant(t, f))).collect(),
         common: VoxelType::ALL.len(),
     }
@@ -114,6 +118,7 @@ impl View for Parameters {
             variant: variant(volume.voxel_type(), features),
             cells: if self.empty_space_skipping { CellUse::Distances(self.wanted(&surfaces)) } else { CellUse::None },
             step: (self.step_voxels * smallest) as f32,
+            state_words: STATE_WORDS,
             stepless: false,
             opacity_threshold: if self.layered(&surfaces) { OPACITY_THRESHOLD } else { 1.0 },
             reasons,

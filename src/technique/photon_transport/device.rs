@@ -2,6 +2,9 @@
 
 use crate::{device_enum, device_struct};
 
+/// Words of a lane that a launch leaves to the next: a photon, its steps and its mask.
+pub const STATE_WORDS: usize = 21;
+
 device_enum! {
     /// The geometry of the media (`kernels/shared/medium.h`).
     pub enum Media: "MEDIA" {
@@ -138,6 +141,10 @@ device_struct! {
         pub own_grids: i32,
         /// The entry of the ledger that counts the histories that have been taken.
         pub taken_at: i32,
+        /// Steps that a work-item may take in this launch.
+        pub most_steps: u32,
+        /// 1 if the work-items go on with what the launch before has left.
+        pub resumed: i32,
         /// The seed, low and high word.
         pub seed: [u32; 2],
     }

@@ -4,10 +4,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::Simulation;
-use super::device::FieldPass;
+use super::device::{FieldPass, STATE_WORDS};
 use super::plan::DevicePlan;
 use super::report::Ledgers;
-use crate::device::{Buffer, Device, DeviceInfo, SliceLength};
+use crate::device::{Buffer, Device, DeviceInfo, Resume, SliceLength};
 use crate::error::Result;
 use crate::technique::{Look, Process, Progress, Step};
 use crate::volume::Volume;
@@ -48,7 +48,18 @@ pub(super) struct Run {
     done: u64,
     total: u64,
     slice_length: SliceLength,
+    resume: Resume,
+    /// The launch whose photons are not all done.
+    launch: Option<Launch>,
     device_time: Duration,
+}
+
+/// Photons that are launched together, in one launch of the kernel or in several.
+struct Launch {
+    pass: FieldPass,
+    items: usize,
+    /// Time on the device so far.
+    took: Duration,
 }
 
 impl Run {
@@ -69,6 +80,8 @@ impl Run {
             done: 0,
             total: simulation.parameters.photons,
             slice_length: SliceLength::new(device.info(), 1.0, None),
+            resume: Resume::new(device, STATE_WORDS)?,
+            launch: None,
             device_time: Duration::ZERO,
             simulation,
             plan,
@@ -81,10 +94,6 @@ impl Run {
         (u128::from(self.total) * (batch as u128 + 1) / u128::from(batches)) as u64
     }
 
-    fn progress(&self) -> Progress {
-        Progress { of: "photons", done: self.done, total: self.total }
-    }
-
     fn close_batch(&mut self, device: &Device) -> Result<()> {
         let mut sums = vec![0u64; self.plan.ledger];
         device.read(&self.ledger, 0, &mut sums)?;
@@ -94,9 +103,8 @@ impl Run {
         Ok(())
     }
 
-    /// Launches photons for about `slice`, up to the end of the batch at `end`.
-    fn launch(&mut self, device: &Device, slice: Duration, end: u64) -> Result<Duration> {
-        let info = device.info();
+    /// The next launch: photons for about `slice`, up to the end of the batch at `end`.
+    fn next_launch(&self, info: &DeviceInfo, slice: Duration, end: u64) -> Launch {
         let (stride, wanted) = match self.grids {
             // A few items that take photons as long as there are any: their lanes are refilled until the last.
             Some(grids) => (info.local_size, grids),
@@ -114,36 +122,62 @@ impl Run {
             stride: stride as u32,
             own_grids: self.grids.is_some().into(),
             taken_at: self.plan.ledger as i32,
+            most_steps: 0,
+            resumed: 0,
             seed: [seed as u32, (seed >> 32) as u32],
         };
-        device.write(&mut self.pass, 0, bytemuck::bytes_of(&pass))?;
-        device.write(&mut self.ledger, 8 * self.plan.ledger, &[0; 8])?;
-        let items = wanted.min(count.div_ceil(per_item) as usize) * stride;
+        Launch { pass, items: wanted.min(count.div_ceil(per_item) as usize) * stride, took: Duration::ZERO }
+    }
+
+    /// Works for about `slice` on the photons of `launch`. Returns it where they are not done.
+    fn work(&mut self, device: &Device, slice: Duration, mut launch: Launch) -> Result<Option<Launch>> {
+        launch.pass.most_steps = self.resume.steps();
+        device.write(&mut self.pass, 0, bytemuck::bytes_of(&launch.pass))?;
+        self.resume.before(device, launch.items)?;
         let arguments = [
             ("pass", &self.pass),
             ("params", &self.parameters),
             ("table", &self.table),
             ("grid", &self.grid),
             ("ledger", &self.ledger),
+            ("state", self.resume.state()),
         ];
-        let took = device.run(&self.plan.variant, &arguments, items)?;
-        self.slice_length.learn(count as usize, 1, took);
+        let took = device.run(&self.plan.variant, &arguments, launch.items)?;
+        self.resume.after(device, slice, took)?;
         self.device_time += took;
-        self.done += count;
-        Ok(took)
+        launch.took += took;
+        if self.resume.has_more() {
+            launch.pass.resumed = 1;
+            return Ok(Some(launch));
+        }
+        self.slice_length.learn(launch.pass.count as usize, 1, launch.took);
+        self.done += u64::from(launch.pass.count);
+        Ok(None)
     }
 }
 
 impl Process for Run {
     fn step(&mut self, device: &mut Device, slice: Duration) -> Result<Step> {
         let end = self.batch_end(self.ledgers.len());
-        let device_time = self.launch(device, slice, end)?;
+        let before = self.device_time;
+        let launch = match self.launch.take() {
+            Some(launch) => launch,
+            None => {
+                device.write(&mut self.ledger, 8 * self.plan.ledger, &[0; 8])?;
+                self.next_launch(device.info(), slice, end)
+            }
+        };
+        self.launch = self.work(device, slice, launch)?;
         let ends_batch = self.done >= end;
         if ends_batch {
             self.close_batch(device)?;
         }
-        let is_look_due = ends_batch && self.ledgers.len().is_power_of_two();
-        Ok(Step { progress: self.progress(), device_time, is_look_due })
+        Ok(Step {
+            progress: Progress { of: "photons", done: self.done, total: self.total },
+            device_time: self.device_time - before,
+            is_whole: self.launch.is_none(),
+            is_look_due: ends_batch && self.ledgers.len().is_power_of_two(),
+        })
     }
 
     fn stop(&mut self, device: &mut Device) -> Result<()> {

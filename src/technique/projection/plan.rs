@@ -5,6 +5,7 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use super::{DeviceMode, Mode, Parameters, Projection, TECHNIQUE};
+use crate::device::Resume;
 use crate::device::enums::DeviceEnum;
 use crate::device::program::{Source, Variant, listed};
 use crate::device::structs::{DeviceStruct, View as DeviceView};
@@ -18,6 +19,9 @@ use crate::technique::stepping::{Way, stepping};
 use crate::technique::steps::coarse_step;
 use crate::technique::{CellUse, Open, Settings, View, ViewPlan, view_text};
 use crate::volume::{Volume, VoxelType};
+
+/// Words of a lane that a launch leaves to the next: a packet's best value.
+const STATE_WORDS: usize = 1;
 
 /// The optical depth of a bright ray in an X-ray by default: an eighth gets through.
 const XRAY_OPTICAL_DEPTH: f64 = 2.0;
@@ -54,7 +58,12 @@ fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
 pub(super) fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
-        structs: || view_text() + &Projection::opencl_text() + &DeviceMode::opencl_text(),
+        structs: || {
+            view_text()
+                + &Projection::opencl_text()
+                + &DeviceMode::opencl_text()
+                + &Resume::opencl_text_of_beams("PROJECTION_BEAM", STATE_WORDS)
+        },
         variants: || FEATURES.iter().flat_map(|f| VoxelType::ALL.map(|t| variant(t, f))).collect(),
         common: 2 * VoxelType::ALL.len(),
     }
@@ -139,6 +148,7 @@ impl View for Parameters {
             variant: variant(volume.voxel_type(), features),
             cells: CellUse::Ranges,
             step: (if self.walked() { 1.0 } else { self.step_voxels } * smallest) as f32,
+            state_words: STATE_WORDS,
             stepless: self.walked(),
             opacity_threshold: 1.0,
             reasons,

@@ -1,6 +1,7 @@
 //! The kernels of scattering views and their variants.
 
 use super::device::{Density, Scattering};
+use crate::device::Resume;
 use crate::device::enums::{DeviceEnum, LightKind, PhaseKind};
 use crate::device::program::{Source, Variant, listed};
 use crate::device::structs::DeviceStruct;
@@ -9,6 +10,9 @@ use crate::scene::interpolation::Interpolation;
 use crate::technique::majorant::Tracking;
 use crate::technique::view_text;
 use crate::volume::VoxelType;
+
+/// Words of a lane that a launch leaves to the next: a sample of `single_scatter`, which has more than a path, and its mask.
+pub(super) const STATE_WORDS: usize = 54;
 
 pub(super) type Features = [(&'static str, i32); 3];
 
@@ -40,6 +44,7 @@ pub(in crate::technique) fn source(kernel: &'static str) -> Source {
                 + &Scattering::opencl_text()
                 + &[Density::opencl_text(), Tracking::opencl_text()].concat()
                 + &[PhaseKind::opencl_text(), LightKind::opencl_text()].concat()
+                + &Resume::opencl_text("SCATTERING", STATE_WORDS)
         },
         variants: match kernel {
             "single_scatter" => || variants("single_scatter"),

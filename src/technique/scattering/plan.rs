@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::device::{Density, Scattering};
-use super::kernels::{Features, of, permitted};
+use super::kernels::{Features, STATE_WORDS, of, permitted};
 use super::parameters::{Parameters, Tracking as Asked};
 use crate::device::cells::CELL;
 use crate::device::program::Variant;
@@ -176,6 +176,7 @@ impl View for Scatterer {
             variant,
             cells: CellUse::Ranges,
             step: (CELL as f64 * Self::smallest_voxel(volume)) as f32,
+            state_words: STATE_WORDS,
             stepless: true,
             opacity_threshold: 1.0,
             reasons: vec![why, format!("sigma_t_per_unit: {:.6}, {:.6}, {:.6}", sigma[0], sigma[1], sigma[2])],

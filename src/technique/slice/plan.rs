@@ -75,6 +75,7 @@ impl View for Parameters {
             variant: variant(volume.voxel_type(), features),
             cells: CellUse::None,
             step: smallest as f32,
+            state_words: 0,
             stepless: true,
             opacity_threshold: 1.0,
             reasons: vec![format!("window: {}", self.window(volume)?)],
