@@ -1,35 +1,35 @@
 //! Cloudchamber: a server that renders volumes and shows how accurate each picture is and what it cost.
 //!
 //! ```text
-//! HTTP body ─► request ─► render ─► plan ─► job ─► device ─► film | field ─► frame ─► HTTP stream
-//!            (wire JSON) (valid)  (data)  (queue) (OpenCL)  (sums)         (PNG)
+//! HTTP body ─► request ─► render ─► job ─► run ─► device ─► film | field ─► frame ─► HTTP stream
+//!            (wire JSON) (valid) (record) (slices) (OpenCL)  (sums)        (PNG)
 //! ```
 //!
-//! The data goes one way. Who uses whom: `http` and `command` → `study` → `service` → `plan` and `run` → `job` → `render` → `technique` → `scene` → `request` → `device` → `film` →
-//! `frame` → `volume` → `power_law` → `error`; never back (`tests/house.rs` sees to it). A job holds its scene and lets it be planned where it
-//! runs, since a field's plan changes while it fills.
+//! The data goes one way, and modules use each other the other way: `command` → `http` → `study` → `service` → `plan` and `run` → `job` →
+//! `render` → `technique` → `scene` → `request` → `config` → `device` → `film` → `frame` → `volume` → `error`, never back and never in a circle
+//! (`tests/house.rs`). `docs/architecture.md` walks one request and one field through the files.
 //!
 //! | module | what it is |
 //! |---|---|
-//! | [`config`] | flags and environment: address, folders, limits |
-//! | [`error`] | one error enum; the one place where a status code is chosen |
-//! | [`http`] | routes, content negotiation, problem details, streams, OpenAPI; no physics |
 //! | [`command`] | the command line: a file a command, and its side of the HTTP contract |
-//! | [`request`] | wire types and the schemas they are checked against |
-//! | [`render`] | the validated request: scene, subject, budget |
-//! | [`scene`] | its parts: camera, transfer function, medium, lights, window, clip |
-//! | [`technique`] | the list of techniques; one file each, which makes plans as data |
-//! | [`volume`] | grids: readers, built-ins, the store |
-//! | [`run`] | the device thread: stages of a run, fair slices, passes, kernels compiled beside it |
-//! | [`job`] | the record of a render: queue, states, events, replies, the latest frame; the executor that works on it |
+//! | [`http`] | routes, content negotiation, problem details, streams, OpenAPI; no physics |
+//! | [`study`] | speed against accuracy: cases with a truth, measured |
 //! | [`service`] | the service in one object: engine, volumes, limits, planner; one way to submit a render |
 //! | [`plan`] | the planner: the cheapest setting that is accurate enough, or the best in a time, with reasons |
-//! | [`study`] | speed against accuracy: cases with a truth, measured |
-//! | [`device`] | the only home of OpenCL and of `unsafe`: context, programs, buffers |
+//! | [`run`] | the device thread: stages of a run, fair slices, passes, kernels compiled beside it |
 //! | [`chart`] | charts as SVG |
+//! | [`job`] | the record of a render: queue, states, events, replies, the latest frame; the executor that works on it |
+//! | [`render`] | the validated request: scene, subject, budget |
+//! | [`technique`] | the list of techniques; a file (and folder) each, which describes itself: parameters, kernel, settings, work |
+//! | [`scene`] | the parts of a scene: camera, transfer function, medium, lights, window, clip |
+//! | [`request`] | wire types and the schemas they are checked against |
+//! | [`config`] | flags and environment: address, folders, limits |
+//! | [`device`] | the only home of OpenCL and of `unsafe`: context, programs, buffers, bounded launches |
 //! | [`film`] | sums on the host: picture and error |
 //! | [`frame`] | picture to PNG or EXR, with its metadata |
+//! | [`volume`] | grids: readers, built-ins, the store |
 //! | [`power_law`] | lines on logarithmic axes |
+//! | [`error`] | one error enum; the one place where a status code is chosen |
 //!
 //! Kernels: `kernels/<technique>.cl` and `kernels/shared/`. The viewer: `static/`. Tests: `tests/<technique>.rs` and
 //! `tests/{api,stream,faults,viewer,…}.rs`.

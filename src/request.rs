@@ -203,6 +203,14 @@ pub fn schema_without<T: JsonSchema>(fields: &[&str]) -> Value {
 /// [`Error::Invalid`] with every violation, each with its pointer and the permitted range.
 pub fn parse<T: DeserializeOwned>(value: &Value, schema: &'static Value, at: &str) -> Result<T> {
     check(value, schema, at)?;
+    read(value, at)
+}
+
+/// Deserialises a value that has been checked against its schema, as part of a whole body.
+///
+/// # Errors
+/// [`Error::Invalid`] where the schema permits more than the type.
+pub fn read<T: DeserializeOwned>(value: &Value, at: &str) -> Result<T> {
     let value = with_whole_numbers(value);
     T::deserialize(&value)
         .map_err(|e| Error::invalid(at, e.to_string(), "see the schema in /v1/techniques and /openapi.json"))

@@ -75,7 +75,7 @@ impl Bench {
     /// Starts the service. Must be called on a thread of a tokio runtime that may block.
     ///
     /// # Errors
-    /// [`Error::Internal`] when the device or the folder cannot be used.
+    /// [`crate::error::Error::Internal`] when the device or the folder cannot be used.
     pub fn new(args: &DeviceArgs, limits: Limits) -> Result<Self> {
         let handle = Handle::current();
         let service = Service::start(args.device_config(), &args.data_dir(), limits)?;
@@ -96,7 +96,7 @@ impl Bench {
     /// Runs a request to its end.
     ///
     /// # Errors
-    /// Those of the request, or [`Error::Internal`] when it fails.
+    /// Those of the request, or [`crate::error::Error::Internal`] when it fails.
     pub fn finish(&self, request: &Value) -> Result<Arc<Job>> {
         self.handle.block_on(self.service.submit_and_wait(request.clone()))
     }
@@ -104,7 +104,7 @@ impl Bench {
     /// The film of a finished request.
     ///
     /// # Errors
-    /// [`Error::NotFound`] where it is not kept any more.
+    /// [`crate::error::Error::NotFound`] where it is not kept any more.
     pub fn film(&self, job: &Arc<Job>) -> Result<Arc<Film>> {
         self.handle.block_on(self.service.engine().film(job))
     }

@@ -226,7 +226,7 @@ pub fn example() -> Value {
 }
 
 fn parse(parameters: &Value, at: &str) -> Result<Arc<dyn View>> {
-    let parameters: Parameters = request::parse(parameters, (TECHNIQUE.schema)(), at)?;
+    let parameters: Parameters = request::read(parameters, at)?;
     if let Some(light) = &parameters.light {
         light.check(&format!("{at}/light"))?;
     }

@@ -4,10 +4,9 @@
 //! its own buffers, and can be looked at, stopped and resumed between any two slices. What it counts (photons, iterations, views) is its
 //! own business.
 //!
-//! A process drives the device itself, through the safe methods of [`Device`]; it does not hand over a recording of what is to be done. Both
-//! were tried on `photon_transport`. A recording cannot decide: how many photons fit in a slice is learnt from the launch before, and an
-//! iterative solver needs an inner product before its next step. So each step fell in two halves with the state between them kept by hand,
-//! and the recorder needed a second vocabulary for all that [`Device`] can do.
+//! A process drives the device itself, through the safe methods of [`Device`]; it does not hand over a recording of what is to be done. A
+//! recording cannot decide: how many photons fit in a slice is learnt from the launch before, and an iterative solver needs an inner product
+//! before its next step.
 
 use std::sync::Arc;
 use std::time::Duration;

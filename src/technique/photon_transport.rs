@@ -38,7 +38,9 @@
 pub mod attenuation;
 mod clearance;
 mod device;
+mod gammas;
 mod geometry;
+mod grid_request;
 mod layers;
 mod medium;
 mod parameters;
@@ -137,7 +139,7 @@ fn parse(parameters: &Value, at: &str, store: &Store) -> Result<Arc<dyn Field>> 
 }
 
 fn simulation(parameters: &Value, at: &str, store: &Store) -> Result<Simulation> {
-    let p: Parameters = request::parse(parameters, (TECHNIQUE.schema)(), at)?;
+    let p: Parameters = request::read(parameters, at)?;
     let geometry = Geometry::new(&p, store, at)?;
     let source = p.source.resolve(geometry.size_mm, geometry.chamber, &format!("{at}/source"))?;
     if let Some(histogram) = &p.exit_histogram {
@@ -174,7 +176,7 @@ fn simulation(parameters: &Value, at: &str, store: &Store) -> Result<Simulation>
         None => (false, "photons collide everywhere"),
     };
     let (tracking, tracking_reason) = tracking::choose(&p, &geometry, track, at)?;
-    attenuation::check(&p, &geometry, tracking, at)?;
+    gammas::check(&p, &geometry, tracking, at)?;
     if p.tally == "radiance_gather" && track {
         let permitted = "collision, or leave it out";
         return Err(Error::invalid(format!("{at}/estimator"), "the gather scores collisions", permitted));

@@ -182,7 +182,7 @@ pub fn example() -> Value {
 }
 
 fn parse(parameters: &Value, at: &str) -> Result<Arc<dyn View>> {
-    let parameters: Parameters = request::parse(parameters, (TECHNIQUE.schema)(), at)?;
+    let parameters: Parameters = request::read(parameters, at)?;
     if let Some(window) = &parameters.window {
         window.check(&format!("{at}/window"))?;
     }

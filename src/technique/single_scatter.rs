@@ -61,6 +61,6 @@ fn source() -> Source {
 }
 
 fn parse(parameters: &Value, at: &str) -> Result<Arc<dyn View>> {
-    let parameters: Parameters = request::parse(parameters, schema(), at)?;
+    let parameters: Parameters = request::read(parameters, at)?;
     Ok(Arc::new(Scatterer::new(TECHNIQUE.name, parameters, at)?))
 }

@@ -9,10 +9,6 @@ use std::f64::consts::PI;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::geometry::{Geometry, Where};
-use super::medium::Medium;
-use super::parameters::Parameters;
-use super::tracking::Tracking;
 use crate::error::{Error, Result};
 
 /// Below this a photon is absorbed where it is.
@@ -214,7 +210,11 @@ impl Attenuation {
         (mu_per_mm, if mu_per_mm > 0.0 { (compton_per_mm / mu_per_mm).min(1.0) } else { 0.0 })
     }
 
-    fn check(&self, at: &str) -> Result<()> {
+    /// Checks that it is a material, or a table, and that a table is one.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] naming the field under `at`.
+    pub fn check(&self, at: &str) -> Result<()> {
         let table = self.energies_kev.is_some() || self.mu_per_mm.is_some() || self.electrons_per_mm3.is_some();
         match (&self.material, &self.energies_kev, &self.mu_per_mm) {
             (Some(_), ..) if !table => Ok(()),
@@ -231,66 +231,4 @@ impl Attenuation {
             }
         }
     }
-}
-
-/// Extinction and albedo of every medium, even in the logarithm of the energy up to the source's.
-pub fn rows(media: &[Medium], source_kev: f64) -> Vec<f32> {
-    let energy = |row: usize| LEAST_KEV * (source_kev / LEAST_KEV).powf(row as f64 / (ROWS - 1) as f64);
-    let of = |m: &Medium, row: usize| m.attenuation.as_ref().map_or((0.0, 0.0), |a| a.at(energy(row)));
-    media
-        .iter()
-        .flat_map(|m| (0..ROWS).map(move |row| of(m, row)))
-        .flat_map(|(mu, albedo)| [mu as f32, albedo as f32])
-        .collect()
-}
-
-/// Checks that gamma media are whole and alone.
-///
-/// # Errors
-/// Media of both kinds, no attenuation, a tracker that goes by majorants.
-pub fn check(p: &Parameters, geometry: &Geometry, tracking: Tracking, at: &str) -> Result<()> {
-    for (i, medium) in geometry.media.iter().enumerate() {
-        let place = match geometry.place {
-            Where::Layers(_) => format!("{at}/layers/{i}"),
-            Where::Labels { .. } => format!("{at}/media/{i}"),
-            _ => format!("{at}/medium"),
-        };
-        let compton = medium.phase.kind == "klein_nishina";
-        if compton != geometry.is_gamma() {
-            let permitted = "klein_nishina for all media or for none";
-            return Err(Error::invalid(format!("{place}/phase/type"), "gamma photons beside light", permitted));
-        }
-        match &medium.attenuation {
-            Some(attenuation) if compton => attenuation.check(&format!("{place}/attenuation"))?,
-            None if !compton => {}
-            Some(_) => {
-                let permitted = "leave it out, or the phase klein_nishina";
-                return Err(Error::invalid(format!("{place}/attenuation"), "only for gamma photons", permitted));
-            }
-            None => {
-                let permitted = "a material, or a table";
-                return Err(Error::invalid(format!("{place}/attenuation"), "klein_nishina needs it", permitted));
-            }
-        }
-    }
-    if geometry.is_gamma() && tracking != Tracking::Exact {
-        let detail = "the extinction of gamma photons changes with their energy, so there is no one majorant or step";
-        return Err(Error::invalid(format!("{at}/tracking"), detail, "auto or exact"));
-    }
-    if geometry.is_gamma() && p.tally == "radiance_gather" {
-        return Err(Error::invalid(format!("{at}/tally"), "the gather is of light", "fluence or absorbed"));
-    }
-    if geometry.is_gamma() && p.tally == "absorbed" && p.estimator.as_deref() == Some("track_length") {
-        let permitted = "collision, or leave it out";
-        return Err(Error::invalid(
-            format!("{at}/estimator"),
-            "what gamma photons leave depends on their angle",
-            permitted,
-        ));
-    }
-    if !geometry.is_gamma() && p.source.energy_kev.is_some() {
-        let permitted = "leave it out, or media with the phase klein_nishina";
-        return Err(Error::invalid(format!("{at}/source/energy_kev"), "only for gamma photons", permitted));
-    }
-    Ok(())
 }

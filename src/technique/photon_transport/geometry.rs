@@ -2,8 +2,6 @@
 
 use std::sync::OnceLock;
 
-use schemars::JsonSchema;
-use serde::Deserialize;
 use serde_json::json;
 
 use super::clearance::clearances;
@@ -13,22 +11,6 @@ use super::parameters::Parameters;
 use crate::error::{Error, Result};
 use crate::scene::phase::Phase;
 use crate::volume::{Store, Volume, builtin};
-
-/// A volume whose voxels say what is where.
-#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct GridRequest {
-    /// The id of an uploaded volume.
-    id: Option<String>,
-    /// The name of a built-in volume.
-    builtin: Option<String>,
-    /// Voxels a side of a built-in volume. Default 64.
-    #[schemars(range(min = 8, max = 512))]
-    resolution: Option<u32>,
-    /// Seed of a built-in volume that is made of random numbers.
-    #[schemars(range(min = 0, max = 9_007_199_254_740_991u64))]
-    seed: Option<u64>,
-}
 
 /// The place of each medium.
 #[derive(Debug, Clone)]
@@ -61,20 +43,6 @@ pub struct Geometry {
     pub dims: [usize; 3],
     /// True if it is the lecture's chamber.
     pub chamber: bool,
-}
-
-fn volume(request: &GridRequest, store: &Store, at: &str) -> Result<std::sync::Arc<Volume>> {
-    match (&request.id, &request.builtin) {
-        (Some(id), None) => store.named(id, &format!("{at}/id")),
-        (None, Some(name)) if builtin::NAMES.contains(&name.as_str()) => {
-            store.builtin(name, request.resolution.unwrap_or(64) as usize, request.seed.unwrap_or(0))
-        }
-        (None, Some(name)) => {
-            let permitted = builtin::NAMES.join(", ");
-            Err(Error::invalid(format!("{at}/builtin"), format!("there is no built-in volume '{name}'"), permitted))
-        }
-        _ => Err(Error::invalid(at, "a volume is named by exactly one of id and builtin", "id or builtin")),
-    }
 }
 
 impl Geometry {
@@ -114,9 +82,9 @@ impl Geometry {
         let geometry = if let Some(layers) = &p.layers {
             Self::layers(p, layers, at)
         } else if let (Some(labels), Some(media)) = (&p.labels, &p.media) {
-            Self::labels(p, &*volume(labels, store, &format!("{at}/labels"))?, media, at)
+            Self::labels(p, &*labels.volume(store, &format!("{at}/labels"))?, media, at)
         } else if let Some(density) = &p.density {
-            Self::density(p, &*volume(density, store, &format!("{at}/density"))?, at)
+            Self::density(p, &*density.volume(store, &format!("{at}/density"))?, at)
         } else if let Some(medium) = &p.medium {
             let size_mm = p.size_mm.unwrap_or([60.0; 3]);
             Ok(Self { place: Where::Box, media: vec![medium.clone()], size_mm, dims: p.dims([60; 3]), chamber: false })

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::geometry::GridRequest;
+use super::grid_request::GridRequest;
 use super::layers::Layer;
 use super::medium::Medium;
 use super::source::LightSource;

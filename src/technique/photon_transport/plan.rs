@@ -2,12 +2,12 @@
 
 use std::f64::consts::PI;
 
-use super::attenuation::{self, LEAST_KEV, ROWS};
+use super::attenuation::{LEAST_KEV, ROWS};
 use super::device::{BoundaryKind, LedgerEntry, Media, Tally};
 use super::geometry::{Geometry, Where};
 use super::parameters::Parameters;
 use super::tracking::{Tracking, majorants};
-use super::{PhotonTransport, Simulation, TECHNIQUE, medium};
+use super::{PhotonTransport, Simulation, TECHNIQUE, gammas, medium};
 use crate::device::enums::DeviceEnum;
 use crate::device::program::{Variant, listed};
 use crate::error::Result;
@@ -229,7 +229,7 @@ impl Simulation {
             device.gamma_least_kev = LEAST_KEV as f32;
             device.gamma_least_log2 = LEAST_KEV.log2() as f32;
             device.gamma_rows_per_log2 = ((ROWS - 1) as f64 / (source_kev / LEAST_KEV).log2().max(1e-6)) as f32;
-            device.at_gamma = append(&mut table, attenuation::rows(&g.media, source_kev));
+            device.at_gamma = append(&mut table, gammas::rows(&g.media, source_kev));
         }
         device.most_steps = self.most_steps(device.cells);
         let mut bins = 0;
