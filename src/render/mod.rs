@@ -3,6 +3,7 @@
 
 pub(crate) mod region;
 mod schema;
+mod shared;
 mod subject;
 
 use std::sync::Arc;
@@ -19,6 +20,7 @@ use crate::technique::{self, Kind, Setting, Technique, View};
 use crate::volume::{Store, Volume};
 use region::Region;
 pub use schema::{parameters_schema, schema};
+use shared::{own_parameters, where_it_was_given};
 pub use subject::{AskedWork, Subject};
 
 /// The technique of a request that leaves it to the planner.
@@ -261,41 +263,6 @@ fn background(image: &ImageRequest) -> Result<Background> {
         (_, Some(true)) => Ok(Background::Transparent),
         (color, _) => Ok(Background::Colour(color.unwrap_or_default().map(|c| c as f32))),
     }
-}
-
-/// The sections of the request that techniques share, where it has them.
-fn shared_sections(request: &RenderRequest) -> [(&'static str, &Option<Value>); 2] {
-    [("medium", &request.medium), ("lights", &request.lights)]
-}
-
-/// A technique's own parameters, with the sections of the request that it shares put among them.
-fn own_parameters(technique: &Technique, request: &RenderRequest) -> Result<Value> {
-    let mut own = request.parameters.get(technique.name).cloned().unwrap_or_else(|| Value::Object(Default::default()));
-    for (name, shared) in shared_sections(request) {
-        let Some(shared) = shared else { continue };
-        if !technique.shares.contains(&name) {
-            let sharing: Vec<&str> = technique::views().filter(|t| t.shares.contains(&name)).map(|t| t.name).collect();
-            let detail = format!("{} scatters no light", technique.name);
-            let permitted = format!("{}, or leave it out", sharing.join(" or "));
-            return Err(Error::invalid(format!("/{name}"), detail, permitted));
-        }
-        if own.get(name).is_some() {
-            let detail = format!("/{}/{name} is given too", technique.name);
-            return Err(Error::invalid(format!("/{name}"), detail, "in one place"));
-        }
-        own[name] = shared.clone();
-    }
-    Ok(own)
-}
-
-/// The error with the pointers that the request has, for sections that were put among a technique's own parameters.
-fn where_it_was_given(error: Error, technique: &Technique, request: &RenderRequest) -> Error {
-    let shared = shared_sections(request);
-    error.with_pointers(|pointer| {
-        let rest = pointer.strip_prefix(&format!("/{}", technique.name))?;
-        let name = rest.strip_prefix('/')?.split('/').next()?;
-        shared.iter().any(|(section, given)| *section == name && given.is_some()).then(|| rest.to_owned())
-    })
 }
 
 /// A budget that names only a time or an error may take as many samples as the server permits.

@@ -4,6 +4,8 @@
 //! proper follow, and the control gets another sample each time their number has doubled, so that it always costs little and knows
 //! enough; where nothing but the step tells the two apart, it gets one for each.
 
+mod launch;
+
 use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
@@ -19,7 +21,7 @@ use super::motion::{Motion, Moving};
 use super::sample_offsets::sample_offset;
 use super::warnings::warnings;
 use crate::device::structs::View as DeviceView;
-use crate::device::{Buffer, Device, Resume, SliceLength};
+use crate::device::{Buffer, Resume, SliceLength};
 use crate::error::Result;
 use crate::render::Scene;
 use crate::scene;
@@ -30,8 +32,6 @@ use crate::volume::Volume;
 const LEAST_STEP_VOXELS: f64 = 0.05;
 /// A pass in shorter slices does not tell how fast its kernel is: each waits for its longest rays.
 const TELLING_SLICE: Duration = Duration::from_millis(10);
-/// A beam has as many packets at most: rays of so many times fewer steps than a work-item may take are not bounded.
-const PACKETS: u32 = 4;
 /// A picture is not shown before its first pass where that is likely to take less than this.
 const QUICK_MS: f64 = 50.0;
 
@@ -265,58 +265,6 @@ impl ViewRun {
             self.gathered.keep_round(context, self.device_time)?;
         }
         Ok(Some(pass))
-    }
-
-    /// Work-items of a launch for about `slice`.
-    fn items(&self, device: &Device, slice: Duration, rays: usize) -> usize {
-        let items = self.slice_length.items(device.info(), slice, rays);
-        if self.is_bounded(device) { items.min(self.resume.most_items(device)) } else { items }
-    }
-
-    /// True if a work-item may have more to do than fits in a launch: random paths, or rays of very many steps.
-    fn is_bounded(&self, device: &Device) -> bool {
-        let (steps, most) = (self.longest / f64::from(self.plan.step), f64::from(device.first_steps() / PACKETS));
-        self.plan.state_words > 0 && (self.is_random() || steps > most)
-    }
-
-    /// Runs `items` work-items of the pass, from the cursor on, or goes on with what the last launch of them has left.
-    fn launch(
-        &mut self,
-        device: &Device,
-        pass: Pass,
-        items: usize,
-        slice: Duration,
-        resumed: bool,
-    ) -> Result<Duration> {
-        let bounded = self.is_bounded(device);
-        self.pass_view.first_beam = self.cursor as i32;
-        self.pass_view.most_steps = if bounded { self.resume.steps() } else { 0 };
-        self.pass_view.resumed = resumed.into();
-        device.write(&mut self.view_buffer, 0, bytemuck::bytes_of(&self.pass_view))?;
-        if bounded {
-            self.resume.before(device, items)?;
-        }
-        let layer = self.gathered.layer(pass);
-        let cells = match &self.distances {
-            Some(distances) => ("distances", &**distances),
-            None => ("ranges", &self.volume.cells.ranges),
-        };
-        let mut arguments = vec![
-            ("view", &self.view_buffer),
-            ("params", &self.parameters),
-            ("voxels", &self.volume.voxels),
-            cells,
-            ("table", &*layer.table),
-            ("film", &layer.buffer),
-            ("counts", &self.gathered.counts),
-        ];
-        arguments.extend(layer.tiles().map(|tiles| ("tiles", tiles)));
-        arguments.extend((self.plan.state_words > 0).then(|| ("state", self.resume.state())));
-        let took = device.run(&self.plan.variant, &arguments, items)?;
-        if bounded {
-            self.resume.after(device, slice, took)?;
-        }
-        Ok(took)
     }
 
     /// Chooses the next pass.

@@ -1,0 +1,64 @@
+//! One launch of a view's kernel: how many work-items, whether they are bounded in steps, and their arguments.
+
+use std::time::Duration;
+
+use super::ViewRun;
+use crate::device::Device;
+use crate::error::Result;
+use crate::run::gathered::Pass;
+
+/// A beam has as many packets at most: rays of so many times fewer steps than a work-item may take are not bounded.
+const PACKETS: u32 = 4;
+impl ViewRun {
+    /// Work-items of a launch for about `slice`.
+    pub(super) fn items(&self, device: &Device, slice: Duration, rays: usize) -> usize {
+        let items = self.slice_length.items(device.info(), slice, rays);
+        if self.is_bounded(device) { items.min(self.resume.most_items(device)) } else { items }
+    }
+
+    /// True if a work-item may have more to do than fits in a launch: random paths, or rays of very many steps.
+    pub(super) fn is_bounded(&self, device: &Device) -> bool {
+        let (steps, most) = (self.longest / f64::from(self.plan.step), f64::from(device.first_steps() / PACKETS));
+        self.plan.state_words > 0 && (self.is_random() || steps > most)
+    }
+
+    /// Runs `items` work-items of the pass, from the cursor on, or goes on with what the last launch of them has left.
+    pub(super) fn launch(
+        &mut self,
+        device: &Device,
+        pass: Pass,
+        items: usize,
+        slice: Duration,
+        resumed: bool,
+    ) -> Result<Duration> {
+        let bounded = self.is_bounded(device);
+        self.pass_view.first_beam = self.cursor as i32;
+        self.pass_view.most_steps = if bounded { self.resume.steps() } else { 0 };
+        self.pass_view.resumed = resumed.into();
+        device.write(&mut self.view_buffer, 0, bytemuck::bytes_of(&self.pass_view))?;
+        if bounded {
+            self.resume.before(device, items)?;
+        }
+        let layer = self.gathered.layer(pass);
+        let cells = match &self.distances {
+            Some(distances) => ("distances", &**distances),
+            None => ("ranges", &self.volume.cells.ranges),
+        };
+        let mut arguments = vec![
+            ("view", &self.view_buffer),
+            ("params", &self.parameters),
+            ("voxels", &self.volume.voxels),
+            cells,
+            ("table", &*layer.table),
+            ("film", &layer.buffer),
+            ("counts", &self.gathered.counts),
+        ];
+        arguments.extend(layer.tiles().map(|tiles| ("tiles", tiles)));
+        arguments.extend((self.plan.state_words > 0).then(|| ("state", self.resume.state())));
+        let took = device.run(&self.plan.variant, &arguments, items)?;
+        if bounded {
+            self.resume.after(device, slice, took)?;
+        }
+        Ok(took)
+    }
+}
