@@ -123,11 +123,11 @@ pub struct Film {
     pub sums: Sums,
     /// The control, if there is one yet.
     pub control: Option<Samples>,
-    /// Whether a sample of the control is that of the same number of the others but for its step: nothing random is in them.
+    /// True if a sample of the control is that of the same number of the others but for its step: nothing random is in them.
     pub paired: bool,
-    /// Whether the step plays no part in the picture: there is no error of it.
+    /// True if the step plays no part in the picture: there is no error of it.
     pub stepless: bool,
-    /// Whether its samples are random: of one sample the error is told from how neighbours differ.
+    /// True if its samples are random: of one sample the error is told from how neighbours differ.
     pub noisy: bool,
     /// Opacity at which rays end.
     pub opacity_threshold: f64,

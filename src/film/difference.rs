@@ -1,4 +1,4 @@
-//! Whether two films are of the same picture: z of every pixel's luminance.
+//! Tells by z of every pixel's luminance if two films are of the same picture.
 
 use serde::Serialize;
 

@@ -1,4 +1,4 @@
-//! What of a picture was lowered so that it came in time.
+//! The quality that a picture lacks because it had to come in time.
 
 /// What a frame has less of than was asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,7 +16,7 @@ impl Default for Lowered {
 }
 
 impl Lowered {
-    /// Whether nothing was.
+    /// True if it lacks nothing.
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }

@@ -5,7 +5,7 @@ const WELL_SPREAD: f64 = 0.9;
 /// if that is not by chance: by so many deviations of the square of what random ones would differ by.
 pub(crate) const SURE: f64 = 4.0;
 
-/// Whether a picture is looked at after so many samples: 1, 2, 3, 4, 6, 8, 12, …
+/// True if a picture is looked at after so many samples: 1, 2, 3, 4, 6, 8, 12, …
 pub(crate) fn is_round(samples: u32) -> bool {
     samples.is_power_of_two() || (samples.is_multiple_of(3) && (samples / 3).is_power_of_two())
 }

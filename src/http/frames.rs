@@ -91,7 +91,7 @@ impl FrameQuery {
     }
 }
 
-/// Whether the client has the frame of this tag already.
+/// True if the client has the frame of this tag already.
 fn unchanged(headers: &HeaderMap, etag: &str) -> bool {
     let tag = etag.parse::<headers::ETag>().ok();
     headers.typed_get::<headers::IfNoneMatch>().zip(tag).is_some_and(|(seen, tag)| !seen.precondition_passes(&tag))

@@ -67,7 +67,7 @@ impl Engine {
         Self { inner: Arc::new(inner) }
     }
 
-    /// Whether the device is ready.
+    /// The readiness of the device.
     pub fn readiness(&self) -> Readiness {
         self.inner.executor.readiness().borrow().clone()
     }
@@ -105,7 +105,7 @@ impl Engine {
         self.inner.unfinished.load(Ordering::Acquire)
     }
 
-    /// Whether there is room for another render.
+    /// True if there is room for another render.
     pub fn has_room(&self) -> bool {
         self.unfinished() < self.inner.limits.queue
     }
@@ -252,7 +252,7 @@ impl Engine {
         }
     }
 
-    /// Whether the engine is draining.
+    /// True if the engine is draining.
     pub fn is_draining(&self) -> bool {
         self.inner.draining.load(Ordering::Acquire)
     }

@@ -10,7 +10,7 @@ use crate::device::DeviceInfo;
 use crate::error::Result;
 use crate::film::Film;
 
-/// Whether the device is ready to work.
+/// The readiness of a device.
 #[derive(Debug, Clone)]
 pub enum Readiness {
     /// The device is opened, and the first kernels are built.
@@ -46,7 +46,7 @@ pub trait Executor: Send + Sync {
     /// Sends what a render has gathered by now, with its pixels; of one that has nothing yet once it has. Where it is not kept any more, `to` is
     /// dropped.
     fn send_film(&self, job: &Arc<Job>, to: oneshot::Sender<Result<Film>>);
-    /// Whether it is ready to work, and each change of that.
+    /// Its readiness, and each change of that.
     fn readiness(&self) -> watch::Receiver<Readiness>;
     /// How far its kernels are.
     fn kernels(&self) -> KernelProgress;

@@ -123,7 +123,7 @@ impl Job {
         self.lock().field_ms
     }
 
-    /// Whether somebody looks at frames before the final one. Where nobody does, the device and the encoder are not kept busy with them.
+    /// Notes that somebody looks at frames before the final one. Where nobody does, the device and the encoder are not kept busy with them.
     pub fn set_followed(&self, followed: bool) {
         self.final_only.store(!followed, Ordering::Release);
     }
@@ -132,7 +132,7 @@ impl Job {
         !self.final_only.load(Ordering::Acquire)
     }
 
-    /// Whether somebody waits for its end to see its film, which is not let go of then.
+    /// Notes that somebody waits for its end to see its film, which is not let go of then.
     pub fn set_film_wanted(&self, wanted: bool) {
         self.film_wanted.store(wanted, Ordering::Release);
     }

@@ -21,7 +21,7 @@ pub(super) struct Progress {
     /// When the render, or its newest camera, was asked for.
     pub asked: Instant,
     pub scene: Scene,
-    /// Whether the engine holds the job; a new camera for one that it does not hold is submitted again.
+    /// True if the engine holds the job; a new camera for one that it does not hold is submitted again.
     pub in_engine: bool,
     pub reasons: Vec<String>,
     pub warnings: Vec<Value>,

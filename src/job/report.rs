@@ -24,7 +24,7 @@ pub enum State {
 }
 
 impl State {
-    /// Whether nothing more will come, unless a new camera sets a done render running again.
+    /// True if nothing more will come, unless a new camera sets a done render running again.
     pub fn is_terminal(self) -> bool {
         matches!(self, Self::Done | Self::Cancelled | Self::Failed)
     }
@@ -105,7 +105,7 @@ pub struct Frame {
     pub elapsed_ms: f64,
     /// Milliseconds of device time so far.
     pub device_ms: f64,
-    /// Whether no better frame will follow.
+    /// True if no better frame will follow.
     pub is_final: bool,
     /// Strong entity tag: the hash of the bytes, which hold nothing that depends on load or time.
     pub etag: String,

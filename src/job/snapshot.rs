@@ -15,7 +15,7 @@ pub(crate) struct Snapshot {
     /// Its picture in sRGB bytes.
     pub picture: Vec<u8>,
     pub generation: u64,
-    /// Whether it is its camera's first,
+    /// True if it is its camera's first,
     pub is_first: bool,
     /// and when it was made.
     pub made: Instant,

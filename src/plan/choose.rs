@@ -22,7 +22,7 @@ pub struct Chosen {
     pub index: usize,
     /// How much of it.
     pub amount: Amount,
-    /// Whether it is enough for the error asked for.
+    /// True if it is enough for the error asked for.
     pub enough: bool,
     /// Predicted.
     pub device_ms: Predicted,
@@ -62,7 +62,7 @@ pub struct Choice<'a> {
 }
 
 impl Choice<'_> {
-    /// What of a setting's picture is there before its first sample, and what a sample takes, ms.
+    /// The time of a setting's picture before its first sample, and that of a sample, ms.
     fn picture_ms(&self, p: &Pilot) -> [f64; 2] {
         let technique = p.setting.technique;
         let seen = |q: &&Pilot| q.whole.is_some() && q.setting.technique == technique;

@@ -8,7 +8,7 @@ use crate::volume::Volume;
 /// The features of a scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Features {
-    /// Whether every voxel has the same value.
+    /// True if every voxel has the same value.
     pub homogeneous: bool,
     /// The greatest optical depth along each of the volume's axes, of what scatters; none where nothing does.
     pub optical_depth: Option<[f64; 3]>,
@@ -16,7 +16,7 @@ pub struct Features {
     pub albedo: Option<f64>,
     /// The mean cosine of the angle that a scattering turns light by.
     pub anisotropy: Option<f64>,
-    /// What of the light that a slab of the volume's least depth sends back was scattered more than once: the bound by which multiple
+    /// The part of the light that a slab of the volume's least depth sends back which was scattered more than once: the bound by which multiple
     /// scattering may be left out.
     pub multiple_scattering: Option<f64>,
     /// What part each light but a sky has of the light in the middle of the volume, with its place in the request.

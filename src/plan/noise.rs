@@ -35,7 +35,7 @@ pub struct Places {
     /// How much more there is of P² in the picture than in the pilots, and what it might be larger by: these have few of its edges.
     more: f64,
     within: f64,
-    /// Whether more samples than were looked at are taken to be as good as they could be: what might be the best is looked at.
+    /// True if more samples than were looked at are taken to be as good as they could be: what might be the best is looked at.
     pub hopeful: bool,
 }
 
@@ -126,13 +126,13 @@ impl Places {
         squared * self.more * (1.0 + self.within)
     }
 
-    /// Whether P after `samples` of a setting with this J² is known, or too small to matter.
+    /// True if P after `samples` of a setting with this J² is known, or too small to matter.
     pub fn is_known(&self, samples: u32, random: f64) -> bool {
         let seen = self.known.iter().find(|k| k.samples >= samples);
         seen.is_some_and(|s| s.random <= AS_GOOD * random) || self.is_small(samples, random)
     }
 
-    /// Whether P after `samples` is too small to matter beside this J², even if it falls no faster than that.
+    /// True if P after `samples` is too small to matter beside this J², even if it falls no faster than that.
     pub fn is_small(&self, samples: u32, random: f64) -> bool {
         let n = f64::from(samples);
         self.squared(n, 1) <= SMALL * random / n

@@ -52,7 +52,7 @@ pub struct Considered {
     pub error: Option<f64>,
     /// What it is wrong by however many samples it takes.
     pub bias: Option<f64>,
-    /// Whether it is enough.
+    /// True if it is enough.
     pub enough: bool,
     /// Why it is, or is not.
     pub why: String,

@@ -194,7 +194,7 @@ impl Scene {
         &self.given
     }
 
-    /// Whether it has only some of its pixels, for a planner.
+    /// True if it has only some of its pixels, for a planner.
     pub(crate) fn is_pilot(&self) -> bool {
         self.pilot.is_some()
     }
@@ -231,7 +231,7 @@ impl Scene {
     pub fn camera(&self) -> &Camera {
         &self.camera
     }
-    /// What of the volume is shown.
+    /// The part of the volume that is shown.
     pub fn clip(&self) -> &Clip {
         &self.clip
     }

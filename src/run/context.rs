@@ -29,7 +29,7 @@ pub(super) struct DeviceContext {
     /// Rays a millisecond of the last pass, by kernel variant.
     speed: HashMap<Variant, f64>,
     kernels: Kernels,
-    /// Whether processes compile them.
+    /// True if processes compile them.
     compiles_ahead: bool,
 }
 
@@ -90,7 +90,7 @@ impl DeviceContext {
         if self.compiles_ahead { self.kernels.start(&compiler, wake) } else { Ok(()) }
     }
 
-    /// Whether a variant can be run now: builds it where it is compiled, or where nobody compiles ahead. One that cannot yet is asked for.
+    /// True if a variant can be run now. It is built where it is compiled, or where nobody compiles ahead; one that cannot be run yet is asked for.
     ///
     /// # Errors
     /// [`Error::Kernel`] for one that does not build on this device.

@@ -156,7 +156,7 @@ impl Gathered {
         }
     }
 
-    /// Whether there is anything to see.
+    /// True if there is anything to see.
     pub fn is_something(&self) -> bool {
         self.layer(self.shown()).samples > 0
     }

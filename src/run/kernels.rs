@@ -130,7 +130,7 @@ impl Kernels {
         state.status.insert(*variant, status);
     }
 
-    /// Whether a variant is compiled; `None` while that is not known.
+    /// True if a variant is compiled; `None` while that is not known.
     pub fn is_compiled(&self, variant: &Variant) -> Option<bool> {
         match self.lock().status.get(variant) {
             Some(Status::Compiled) => Some(true),

@@ -13,7 +13,7 @@ use crate::render::Scene;
 const SMOOTH_MS: f64 = 16.0;
 /// else 30 a second.
 const STEADY_MS: f64 = 32.0;
-/// What of that the device may have: at first, at least, at most.
+/// The device's part of that: at first, at least, at most.
 const SMOOTH_DEVICE_MS: [f64; 3] = [13.0, 2.0, 14.0];
 const STEADY_DEVICE_MS: [f64; 3] = [25.0, 5.0, 29.0];
 /// What a smooth motion may lose, relative.
@@ -57,7 +57,7 @@ impl Deadline {
 pub(super) struct Motion {
     smooth: Deadline,
     steady: Deadline,
-    /// Whether the last frame was to be smooth.
+    /// True if the last frame was to be smooth.
     is_smooth: bool,
     losses: Option<Losses>,
 }

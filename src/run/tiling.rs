@@ -44,13 +44,13 @@ impl Tiling {
         (self.round, self.passes, self.costs) = (None, 0, None);
     }
 
-    /// Whether an adaptive render should look at the deviations now.
+    /// True if an adaptive render should look at the deviations now.
     pub fn is_due(&self, samples: u32) -> bool {
         let done = self.round.as_ref().is_none_or(|(_, passes)| self.passes == *passes);
         samples >= Random::LEAST_SAMPLES && done
     }
 
-    /// Whether what a sample costs is yet to be learnt.
+    /// True if what a sample costs is yet to be learnt.
     pub fn wants_costs(&self) -> bool {
         self.costs.is_none()
     }

@@ -59,7 +59,7 @@ pub(super) struct ViewRun {
     /// The launch that has left something undone: its work-items, and its time so far.
     undone: Option<(usize, Duration)>,
     slice_length: SliceLength,
-    /// Whether the first pass is likely to be over before a picture of the control could be seen.
+    /// True if the first pass is likely to be over before a picture of the control could be seen.
     quick: bool,
     pass_time: Duration,
     /// The shortest slice of the pass under way.
@@ -153,17 +153,17 @@ impl ViewRun {
         self.gathered.samples()
     }
 
-    /// Whether no pass is under way: all pixels have as many samples as it says.
+    /// True if no pass is under way: all pixels have as many samples as it says.
     pub fn is_between_passes(&self) -> bool {
         self.pass.is_none()
     }
 
-    /// Whether a picture of the control is not worth showing.
+    /// True if a picture of the control is not worth showing.
     pub fn is_quick(&self) -> bool {
         self.quick
     }
 
-    /// Whether the step is still longer than what a request may ask for.
+    /// True if the step is still longer than what a request may ask for.
     pub fn can_halve_step(&self) -> bool {
         self.plan.step >= 2.0 * self.least_step
     }
@@ -218,7 +218,7 @@ impl ViewRun {
         Ok(())
     }
 
-    /// Whether a picture is there that was made to be in time.
+    /// True if a picture is there that was made to be in time.
     pub fn has_hurried(&self) -> bool {
         self.gathered.moving.as_ref().is_some_and(|m| m.layer.samples > 0)
     }
@@ -295,7 +295,7 @@ impl ViewRun {
     }
 }
 
-/// Whether a sample of the control differs from the one of its number in the passes proper by its step alone.
+/// True if a sample of the control differs from the one of its number in the passes proper by its step alone.
 fn is_paired(view: &DeviceView) -> bool {
     view.jittered == 0
 }

@@ -45,7 +45,7 @@ fn note(device: &Device, variant: &Variant) -> Option<PathBuf> {
     Some(PathBuf::from(cache).join("cloudchamber").join(device.fingerprint(&source, variant).ok()?))
 }
 
-/// Whether PoCL's cache has a variant.
+/// True if PoCL's cache has a variant.
 pub(super) fn is_cached(device: &Device, variant: &Variant) -> bool {
     note(device, variant).is_some_and(|note| note.exists())
 }

@@ -1,4 +1,4 @@
-//! What of a volume is shown: clipping planes and a crop box, the same for every view.
+//! The part of a volume that is shown: clipping planes and a crop box, the same for every view.
 
 use glam::DVec3;
 
@@ -41,7 +41,7 @@ impl Clip {
         Ok(Self { planes })
     }
 
-    /// Whether nothing of the volume is left: all its corners are on the wrong side of one plane.
+    /// True if nothing of the volume is left: all its corners are on the wrong side of one plane.
     pub fn removes_all(&self, volume: &Volume) -> bool {
         let size = DVec3::from_array(volume.dims().map(|n| n as f64));
         let corner = |i: usize| DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64) * size;

@@ -65,7 +65,7 @@ pub struct Sky {
     pub radiance: [[f64; 3]; 3],
     /// Which way is up, where the request says so.
     pub up: Option<DVec3>,
-    /// Whether the eye sees it.
+    /// True if the eye sees it.
     pub visible: bool,
 }
 
@@ -256,7 +256,7 @@ impl Lights {
         self.aimed_at().count()
     }
 
-    /// Whether a ray may meet one: it has a size.
+    /// True if a ray may meet one: it has a size.
     pub fn any_with_size(&self) -> bool {
         self.aimed_at().any(|l| l.kind != "point" && (l.kind != "sun" || l.size() > 0.0))
     }

@@ -72,7 +72,7 @@ const BLUE_YELLOW: PresetPoints = &[
     (1.0, 0xffe020, 8.0),
 ];
 
-/// Whether a range of values looks like Hounsfield units: air far below 0 and bone far above.
+/// True if a range of values looks like Hounsfield units: air far below 0 and bone far above.
 pub fn is_hounsfield(range: [f64; 2]) -> bool {
     range[0] <= -500.0 && range[1] >= 600.0
 }

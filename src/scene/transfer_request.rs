@@ -29,7 +29,7 @@ pub struct TransferRequest {
 }
 
 impl TransferRequest {
-    /// Whether it asks for a label volume's colours.
+    /// True if it asks for a label volume's colours.
     pub fn is_labels(&self) -> bool {
         self.labels.is_some() || self.preset.as_deref() == Some("labels")
     }

@@ -14,7 +14,7 @@ use crate::plan::Plan;
 use crate::service::Service;
 use crate::volume::{RawQuery, Store};
 
-/// What of a finished render is compared with a truth.
+/// The numbers of a finished render that are compared with a truth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Reads {
     /// The linear luminance of every pixel.
@@ -44,7 +44,7 @@ pub struct Run {
     pub bytes: u64,
     /// What the reply says its error is.
     pub stated_error: Option<f64>,
-    /// Whether its noise is that of random samples: known, where that of evenly spread ones is a bound.
+    /// True if its noise is that of random samples: known, where that of evenly spread ones is a bound.
     pub noise_is_random: bool,
     /// The whole reply.
     pub reply: Value,

@@ -104,9 +104,9 @@ pub struct Setting {
     pub expected_slope: Option<f64>,
     /// What is read.
     pub reads: Reads,
-    /// Whether it looks at the pixels' centres alone.
+    /// True if it looks at the pixels' centres alone.
     pub centres: bool,
-    /// Whether its errors are random, so that seeds tell them.
+    /// True if its errors are random, so that seeds tell them.
     pub random: bool,
     /// The render request, less its seed.
     pub request: Value,

@@ -1,4 +1,4 @@
-//! Whether the planner keeps its word: random scenes, each planned, rendered as planned, and compared with every setting tried by force.
+//! Checks that the planner keeps its word: random scenes, each planned, rendered as planned, and compared with every setting tried by force.
 
 use std::ops::Range;
 

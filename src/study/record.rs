@@ -29,7 +29,7 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// Whether it is the same but for the time.
+    /// True if it is the same but for the time.
     pub fn is_same(&self, other: &Self) -> bool {
         Self { unix_s: other.unix_s, ..self.clone() } == *other
     }
@@ -46,7 +46,7 @@ pub struct Record {
     pub truth: String,
     /// How well the truth itself is known, relative to its mean: errors below it are not told apart.
     pub truth_known_to: f64,
-    /// Whether it is the short form.
+    /// True if it is the short form.
     pub quick: bool,
     /// Where it was measured.
     pub machine: Machine,
@@ -99,7 +99,7 @@ pub struct Point {
     pub counts: Value,
     /// The codes of its warnings.
     pub warnings: Vec<String>,
-    /// Whether no other setting is both faster and better.
+    /// True if no other setting is both faster and better.
     pub front: bool,
     /// The request.
     pub request: Value,

@@ -22,7 +22,7 @@ pub struct Outcome {
     pub verdict: Verdict,
     /// Places that are not what a closed form says, in words.
     pub surprises: Vec<String>,
-    /// Whether it is the short form.
+    /// True if it is the short form.
     pub quick: bool,
     /// Where it was measured.
     pub machine: Machine,

@@ -42,7 +42,7 @@ impl Verdict {
         }
     }
 
-    /// Whether the build may go on.
+    /// True if the build may go on.
     pub fn is_told(self) -> bool {
         self < Self::BiasedAndSilent
     }
@@ -87,7 +87,7 @@ impl Sample {
         }
     }
 
-    /// Whether it is what was predicted, give or take noise and the part `tolerance`; none without a prediction.
+    /// True if it is what was predicted, give or take noise and the part `tolerance`; none without a prediction.
     pub fn as_predicted(&self, tolerance: f64) -> Option<bool> {
         let predicted = self.predicted?;
         let within = NOISE * self.standard_error + tolerance * predicted.abs().max(self.truth.abs());

@@ -59,7 +59,7 @@ pub struct Builtin {
     pub name: &'static str,
     /// What its values cannot leave.
     pub bounds: [f64; 2],
-    /// Whether the seed changes it.
+    /// True if the seed changes it.
     pub seeded: bool,
 }
 

@@ -21,7 +21,7 @@ pub(super) enum Source<'a> {
 }
 
 impl<'a> Source<'a> {
-    /// Whether the bytes begin as gzip does (RFC 1952: the magic, and deflate, its only method).
+    /// True if the bytes begin as gzip does (RFC 1952: the magic, and deflate, its only method).
     pub fn is_gzip(bytes: &[u8]) -> bool {
         bytes.starts_with(&[0x1f, 0x8b, 8])
     }
@@ -36,7 +36,7 @@ impl<'a> Source<'a> {
         Self::Gzip { decoder: Box::new(MultiGzDecoder::new(bytes)), compressed: bytes.len() }
     }
 
-    /// Whether this is gzip.
+    /// True if this is gzip.
     pub fn compressed(&self) -> bool {
         matches!(self, Self::Gzip { .. })
     }
@@ -105,7 +105,7 @@ impl<'a> Source<'a> {
         Ok(true)
     }
 
-    /// Whether nothing is left. For gzip this also makes the decoder check the stream's checksum.
+    /// True if nothing is left. For gzip this also makes the decoder check the stream's checksum.
     pub fn at_end(&mut self) -> Result<bool> {
         Ok(self.fill(&mut [0])? == 0)
     }

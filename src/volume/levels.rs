@@ -19,7 +19,7 @@ pub const MOST_LEVEL: usize = 8;
 /// The levels of a volume that were asked for.
 pub(super) type Levels = [OnceLock<Arc<Volume>>; MOST_LEVEL];
 
-/// What of an axis one voxel of a level covers: the first voxel, and of it and those that follow the parts inside.
+/// The part of an axis that one voxel of a level covers: the first voxel, and of it and those that follow the parts inside.
 struct Span {
     first: usize,
     parts: Vec<f64>,

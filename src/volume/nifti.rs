@@ -22,12 +22,12 @@ const MAX_OFFSET: f32 = (64 << 20) as f32;
 /// The rows of a map from voxel indices to patient space, and the header's field that gives them.
 type Affine = ([[f64; 4]; 4], &'static str);
 
-/// Whether the bytes begin with a NIfTI-1 header.
+/// True if the bytes begin with a NIfTI-1 header.
 pub(super) fn is_nifti(bytes: &[u8]) -> bool {
     matches!(bytes.get(MAGIC_AT..HEADER_BYTES), Some(b"n+1\0" | b"ni1\0"))
 }
 
-/// Whether the bytes begin with a NIfTI-2 header, which is recognised to be refused by name.
+/// True if the bytes begin with a NIfTI-2 header, which is recognised to be refused by name.
 pub(super) fn is_nifti_2(bytes: &[u8]) -> bool {
     matches!(bytes.get(4..8), Some(b"n+2\0" | b"ni2\0"))
 }

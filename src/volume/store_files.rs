@@ -54,7 +54,7 @@ impl Extension {
     }
 }
 
-/// Whether the text is an id as this store makes them; nothing else ever becomes part of a path.
+/// True if the text is an id as this store makes them; nothing else ever becomes part of a path.
 pub(super) fn is_id(text: &str) -> bool {
     text.len() == ID_DIGITS && text.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
 }

@@ -37,7 +37,7 @@ pub const ELLIPSOIDS: [Ellipsoid; 10] = [
 ];
 
 impl Ellipsoid {
-    /// Whether the point is inside or on the surface.
+    /// True if the point is inside or on the surface.
     pub fn contains(&self, x: f64, y: f64, z: f64) -> bool {
         let [x, y, z] = [x - self.centre[0], y - self.centre[1], z - self.centre[2]];
         // Most points are outside of most ellipsoids: the sphere around one is cheaper to ask than sine and cosine.
