@@ -1,6 +1,6 @@
 // A work-item whose work takes more steps than a launch may take leaves its state in memory and goes on in the next launch. So no launch holds
 // the device for long, whatever a scene asks for.
-// `state` begins with RESUME_HEADER words, the first of which counts the work-items that have more to do. Behind them each work-item has a
+// `state` begins with RESUME_HEADER words, the first of which counts how often work-items have had more to do. Behind them each work-item has a
 // header of as many words, the first of which is 1 while it has more to do, and then some words for each lane, which the host counts too.
 #ifndef SHARED_RESUME_H
 #define SHARED_RESUME_H

@@ -20,6 +20,8 @@ pub struct Resume {
     /// Words of a lane.
     words: usize,
     steps: u32,
+    /// How often work-items have had more to do, as the state counts it.
+    counted: u32,
     has_more: bool,
 }
 
@@ -29,7 +31,8 @@ impl Resume {
     /// # Errors
     /// [`crate::error::Error::Internal`] when the device has no room.
     pub fn new(device: &Device, words: usize) -> Result<Self> {
-        Ok(Self { state: device.allocate(4 * HEADER)?, words, steps: device.first_steps(), has_more: false })
+        let state = device.upload(&[0; 4 * HEADER], 0)?;
+        Ok(Self { state, words, steps: device.first_steps(), counted: 0, has_more: false })
     }
 
     /// The `#define` of a kernel's state, `{name}_STATE_WORDS`: words of a lane.
@@ -76,8 +79,10 @@ impl Resume {
         let bytes = 4 * HEADER + items * self.bytes_per_item(device);
         if self.state.len() < bytes {
             self.state = device.allocate(bytes)?;
+            self.counted = 0;
+            device.write(&mut self.state, 0, &[0; 4])?;
         }
-        device.write(&mut self.state, 0, &[0; 4])
+        Ok(())
     }
 
     /// Learns whether a launch has left anything undone, and how many steps fit in `slice` where it took so long.
@@ -85,9 +90,10 @@ impl Resume {
     /// # Errors
     /// As [`Device::read`].
     pub fn after(&mut self, device: &Device, slice: Duration, took: Duration) -> Result<()> {
-        let mut more = [0u32];
-        device.read(&self.state, 0, &mut more)?;
-        self.has_more = more[0] > 0;
+        let mut counted = [0u32];
+        device.read(&self.state, 0, &mut counted)?;
+        self.has_more = counted[0] != self.counted;
+        self.counted = counted[0];
         if self.has_more {
             let change = (slice.as_secs_f64() / took.as_secs_f64().max(1e-6)).clamp(CHANGE[0], CHANGE[1]);
             self.steps = ((f64::from(self.steps) * change) as u32).clamp(STEPS[0], STEPS[1]);
