@@ -54,7 +54,7 @@ impl DeviceArgs {
     /// What `device/` needs of this.
     pub fn device_config(&self) -> DeviceConfig {
         DeviceConfig {
-            wish: self.device.clone(),
+            target: self.device.clone(),
             lanes: self.lanes,
             kernels: self.kernels.clone(),
             images: self.volume_images,

@@ -1,7 +1,7 @@
 //! Wire types: what a client may send, as JSON Schema and serde see it. No defaults are resolved here and nothing is read.
 //!
 //! A body is checked against the very schema that is served (`schema`), so what the documentation permits and what the
-//! server permits cannot drift apart; what a schema cannot say is checked when the [`crate::scene`] is made.
+//! server permits cannot drift apart; what a schema cannot say is checked when the [`crate::render::Scene`] is made.
 
 use std::sync::{Arc, Mutex, PoisonError};
 

@@ -1,6 +1,6 @@
 //! A tenth of the list of requests against films that were committed: what is drawn stays the same at every level of processors.
 //!
-//! Bytes differ between levels, so films are held to the bound that levels are held to (`tests/levels/runs.rs`). Two builds on one machine
+//! Bytes differ between levels, so films are held to the bound that levels are held to (`tests/common/picture.rs`). Two builds on one machine
 //! are compared to the byte by `./dev compare`. `CLOUDCHAMBER_BLESS=1` writes the films anew, and `CLOUDCHAMBER_KERNELS=FOLDER` takes the
 //! kernels from a folder, such as those of an earlier commit.
 
@@ -15,8 +15,8 @@ use cloudchamber::device::DeviceConfig;
 use cloudchamber::render::{self, Subject};
 use cloudchamber::technique;
 use common::engine::House;
+use common::picture::{Picture, check_comparison};
 use common::pictures::{self, Asked};
-use exr::prelude::{ReadChannels, ReadLayers};
 use serde_json::{Value, json};
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/pictures");
@@ -24,48 +24,6 @@ const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/pictures");
 const SIZE: [usize; 2] = [16, 12];
 /// They take at most so many bytes.
 const ROOM: u64 = 300_000;
-
-/// A picture as a film of linear floats and as bytes.
-#[derive(Clone)]
-struct Picture {
-    size: [usize; 2],
-    /// Red, green, blue and alpha.
-    values: Vec<[f32; 4]>,
-    bytes: Vec<u8>,
-}
-
-impl Picture {
-    /// Reads an EXR and a PNG file.
-    fn read(exr: &[u8], png: &[u8]) -> Self {
-        let read = exr::prelude::read().no_deep_data().largest_resolution_level();
-        let read = read.rgba_channels(
-            |size, _| (size.width(), vec![[0.0; 4]; size.area()]),
-            |(width, pixels), at, (r, g, b, a): (f32, f32, f32, f32)| pixels[at.y() * *width + at.x()] = [r, g, b, a],
-        );
-        let image = read.first_valid_layer().all_attributes().from_buffered(std::io::Cursor::new(exr)).unwrap();
-        let size = [image.layer_data.size.width(), image.layer_data.size.height()];
-        let bytes = image::load_from_memory(png).unwrap().to_rgba8().into_raw();
-        Self { size, values: image.layer_data.channel_data.pixels.1, bytes }
-    }
-
-    /// Tells how it is another picture than the `reference`, if it is.
-    fn other_than(&self, reference: &Self) -> Option<String> {
-        let [ours, theirs] = [self, reference].map(|p| (p.size, p.values.len(), p.bytes.len()));
-        if ours != theirs {
-            return Some(format!("a size of {ours:?} for {theirs:?}"));
-        }
-        let (values, known) = (self.values.as_flattened(), reference.values.as_flattened());
-        if values.iter().zip(known).any(|(a, b)| a.is_finite() != b.is_finite()) {
-            return Some("values that are no numbers".into());
-        }
-        let value = values.iter().zip(known).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-        let byte = self.bytes.iter().zip(&reference.bytes).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
-        let sum = |p: &Self, c: usize| p.values.iter().map(|v| f64::from(v[c])).sum::<f64>() / p.values.len() as f64;
-        let mean = (0..4).map(|c| (sum(self, c) - sum(reference, c)).abs()).fold(0.0, f64::max);
-        let is_same = value < 1.0 / 255.0 && byte <= 1 && mean < 1e-4;
-        (!is_same).then(|| format!("values differ by up to {value:.2e}, bytes by {byte}, the mean by {mean:.1e}"))
-    }
-}
 
 /// The requests whose films are committed, each with a small picture.
 fn references() -> Vec<Asked> {
@@ -89,7 +47,7 @@ fn made(asked: &Asked, house: &House) -> (Picture, [Vec<u8>; 2]) {
     let exr = house.film_of(&job).exr().unwrap();
     let png = job.watch().borrow().frame.as_ref().unwrap().png.to_vec();
     let picture = Picture::read(&exr, &png);
-    assert!(picture.bytes.chunks(4).any(|pixel| pixel != &picture.bytes[..4]), "{}: nothing is seen", asked.name);
+    assert!(picture.shows_something(), "{}: nothing is seen", asked.name);
     (picture, [exr, png])
 }
 
@@ -160,19 +118,7 @@ fn the_films_are_those_of_a_tenth_of_the_list_and_small() {
 
 #[test]
 fn another_picture_is_seen_to_be_another() {
-    let picture = Picture { size: [2, 2], values: vec![[0.5; 4]; 4], bytes: vec![188; 16] };
-    let changed = |change: &dyn Fn(&mut Picture)| {
-        let mut other = picture.clone();
-        change(&mut other);
-        other.other_than(&picture).is_some()
-    };
-    assert!(!changed(&|_| {}) && !changed(&|p| (p.values[1][2], p.bytes[6]) = (0.5003, 189)));
-    assert!(changed(&|p| p.values[3][0] = 0.505), "a pixel is brighter");
-    assert!(changed(&|p| p.bytes[5] = 186), "a byte is darker");
-    assert!(changed(&|p| p.values.iter_mut().for_each(|v| v[1] += 2e-4)), "all of it is greener");
-    assert!(changed(&|p| p.values[0][0] = f32::NAN), "a value is no number");
-    assert!(changed(&|p| p.size = [4, 1]), "it has another form");
-    assert!(changed(&|p| p.values.truncate(3)), "it has fewer pixels");
+    check_comparison();
     assert!(committed("none_of_this_name").is_err(), "there is none");
 }
 

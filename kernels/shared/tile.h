@@ -39,7 +39,7 @@ static inline void cost(global uint *tiles, Tile tile, uint steps) {
     if (tile.times > 0u) atomic_add(&tiles[tile.cost_at], steps);
 }
 
-// The offset of a sample in its pixel: `place_in_pixel` of src/job/places.rs, which says why.
+// The offset of a sample in its pixel: `sample_offset` of src/run/sample_offsets.rs, which says why.
 static inline float2 sample_offset(uint sample) {
     if (sample < 4u) {
         float angle = 0.2617994f + 2.0943951f * (float)sample;

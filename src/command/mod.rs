@@ -11,8 +11,9 @@ use std::net::SocketAddr;
 use clap::{Parser, Subcommand};
 
 use crate::config::{Config, DeviceArgs};
+use crate::device;
 use crate::error::{Error, Result};
-use crate::{device, run as executor};
+use crate::run::compile_kernels;
 
 /// Volume renders as a service: each frame says how accurate it is and what it cost.
 #[derive(Parser)]
@@ -71,7 +72,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
             }
             Command::Device(args) if args.variants => devices::show_variants(&args.device),
             Command::Device(args) => devices::show_devices(&args.device),
-            Command::Compile(device) => executor::compile_kernels(&device.device_config()),
+            Command::Compile(device) => compile_kernels(&device.device_config()),
             Command::Healthcheck { listen } => client::healthcheck(&format!("http://{listen}")).await,
         }
     });

@@ -46,7 +46,7 @@ const SMALL: usize = 1 << 20;
 #[derive(Debug, Clone)]
 pub struct DeviceConfig {
     /// `pocl`, `gpu`, or part of a platform's or device's name.
-    pub wish: String,
+    pub target: String,
     /// Overrides the lanes (1, 4, 8 or 16).
     pub lanes: Option<u32>,
     /// Kernel files are read from here instead of the binary.
@@ -65,7 +65,7 @@ impl DeviceConfig {
     /// The CPU's PoCL with what it likes; each kernel is built when first used.
     pub fn pocl() -> Self {
         Self {
-            wish: "pocl".into(),
+            target: "pocl".into(),
             lanes: None,
             kernels: None,
             images: None,
@@ -158,12 +158,12 @@ pub fn keep_compiled_kernels_in(cache: &Path) -> Result<()> {
 }
 
 impl Device {
-    /// Opens the device that `config` wishes for.
+    /// Opens the device that `config` names.
     ///
     /// # Errors
     /// [`Error::Internal`] when there is none or OpenCL fails.
     pub fn open(config: &DeviceConfig) -> Result<Self> {
-        let (device, mut info) = select(&config.wish, config.lanes)?;
+        let (device, mut info) = select(&config.target, config.lanes)?;
         info.use_images(config.images);
         let context = cl("creating the context", Context::from_device(&device))?;
         // The 1.x form: PoCL 3.1 and NVIDIA's OpenCL both have it.

@@ -22,6 +22,12 @@ fn words(features: &[(&str, i32)]) -> String {
     features.iter().map(|(name, value)| format!(" {name}={value}")).collect()
 }
 
+/// Every listed combination of features for every type of voxels, the first combination first.
+pub fn each_voxel_type<F: AsRef<[(&'static str, i32)]>>(kernel: &'static str, list: &'static [F]) -> Vec<Variant> {
+    let of = |features: &'static F| VoxelType::ALL.map(|voxel| Variant::new(kernel, Some(voxel), features.as_ref()));
+    list.iter().flat_map(of).collect()
+}
+
 /// The features of `list` that are `wanted`, for a variant of `kernel`.
 ///
 /// # Errors

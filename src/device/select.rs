@@ -81,9 +81,9 @@ impl DeviceInfo {
         self.platform.contains("Portable Computing Language")
     }
 
-    /// Takes volumes as images where `wish` says so, or by default on a GPU that has them; then a work-item is one ray.
-    pub(super) fn use_images(&mut self, wish: Option<bool>) {
-        self.volumes_are_images = self.image_support && wish.unwrap_or(self.kind == "gpu" && self.lanes == 1);
+    /// Takes volumes as images where `target` says so, or by default on a GPU that has them; then a work-item is one ray.
+    pub(super) fn use_images(&mut self, target: Option<bool>) {
+        self.volumes_are_images = self.image_support && target.unwrap_or(self.kind == "gpu" && self.lanes == 1);
         if self.volumes_are_images {
             self.lanes = 1;
             self.volume_sampling = FROM_IMAGES;
@@ -174,15 +174,15 @@ pub fn list(forced_lanes: Option<u32>) -> Result<Vec<(ClDevice, DeviceInfo)>> {
     if found.is_empty() { Err(Error::internal(missing)) } else { Ok(found) }
 }
 
-/// The device for a wish: `pocl` (or `cpu`) the first CPU, PoCL's before others; `gpu` the first GPU; else the first whose
-/// platform or name contains the wish, in any case.
+/// The device for a target: `pocl` (or `cpu`) the first CPU, PoCL's before others; `gpu` the first GPU; else the first whose
+/// platform or name contains the target, in any case.
 ///
 /// # Errors
 /// [`Error::Internal`] when none fits; the message lists what there is.
-pub fn select(wish: &str, forced_lanes: Option<u32>) -> Result<(ClDevice, DeviceInfo)> {
+pub fn select(target: &str, forced_lanes: Option<u32>) -> Result<(ClDevice, DeviceInfo)> {
     let devices = list(forced_lanes)?;
     let names: Vec<String> = devices.iter().map(|(_, i)| format!("{} / {}", i.platform, i.device)).collect();
-    let lower = wish.to_lowercase();
+    let lower = target.to_lowercase();
     let rank = |i: &DeviceInfo| match lower.as_str() {
         "pocl" | "cpu" | "" => (i.kind == "cpu").then_some(if i.is_pocl() { 0 } else { 1 }),
         "gpu" => (i.kind == "gpu").then_some(0),
@@ -194,6 +194,6 @@ pub fn select(wish: &str, forced_lanes: Option<u32>) -> Result<(ClDevice, Device
         .min_by_key(|(r, _, _)| *r)
         .map(|(_, d, i)| (d, i))
         .ok_or_else(|| {
-            Error::internal(format!("no OpenCL device fits --device {wish}; there are: {}", names.join(", ")))
+            Error::internal(format!("no OpenCL device fits --device {target}; there are: {}", names.join(", ")))
         })
 }

@@ -4,14 +4,14 @@
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lowered {
     /// Pixels that a sample stands for, along a side.
-    pub apart: u32,
+    pub stride: u32,
     /// The step, of the one that was asked for.
     pub step: f32,
 }
 
 impl Default for Lowered {
     fn default() -> Self {
-        Self { apart: 1, step: 1.0 }
+        Self { stride: 1, step: 1.0 }
     }
 }
 
@@ -24,8 +24,8 @@ impl Lowered {
     /// In words, for a reader.
     pub fn words(&self) -> Vec<String> {
         let mut words = Vec::new();
-        if self.apart > 1 {
-            words.push(format!("resolution: one pixel in {}", self.apart * self.apart));
+        if self.stride > 1 {
+            words.push(format!("resolution: one pixel in {}", self.stride * self.stride));
         }
         if self.step > 1.0 {
             words.push(format!("step: {} times as long", self.step));

@@ -1,4 +1,4 @@
-//! The picture of a film: as PNG of what the device developed, or in linear floats over its background.
+//! The picture of a film: as PNG of what the device encoded, or in linear floats over its background.
 
 use std::borrow::Cow;
 
@@ -37,7 +37,7 @@ impl Film {
         .to_string()
     }
 
-    /// Its picture, in the bytes that the device developed, as PNG; and the film's error.
+    /// Its picture, in the bytes that the device encoded, as PNG; and the film's error.
     ///
     /// # Errors
     /// `Error::Internal` when the encoder fails.

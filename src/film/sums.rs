@@ -1,4 +1,4 @@
-//! What the error of a film is made of: sums over its pixels, which the device works out (`kernels/develop.cl`).
+//! What the error of a film is made of: sums over its pixels, which the device works out (`kernels/encode.cl`).
 
 /// Sums over the samples of a film.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

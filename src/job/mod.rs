@@ -27,8 +27,8 @@ use crate::scene::camera::Camera;
 pub use cancel::CancelOnDrop;
 pub use engine::{Engine, Place};
 pub use executor::{Executor, KernelProgress, Readiness};
+pub(crate) use progress::NewestCamera;
 use progress::Progress;
-pub(crate) use progress::Turn;
 pub use report::{Counts, Frame, State, Timings, TracePoint, Update};
 pub(crate) use snapshot::{SampleCounts, Snapshot};
 

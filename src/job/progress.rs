@@ -77,7 +77,7 @@ impl Progress {
 }
 
 /// What an executor works on: the newest camera of a job.
-pub(crate) struct Turn {
+pub(crate) struct NewestCamera {
     /// Counts cameras.
     pub generation: u64,
     /// When it was asked for.
@@ -91,9 +91,9 @@ pub(crate) struct Turn {
 
 impl Job {
     /// The newest camera, unless it is that of generation `seen`.
-    pub(crate) fn next_turn(&self, seen: Option<u64>) -> Option<Turn> {
+    pub(crate) fn newest_camera(&self, seen: Option<u64>) -> Option<NewestCamera> {
         let mut progress = self.lock();
-        (Some(progress.generation) != seen).then(|| Turn {
+        (Some(progress.generation) != seen).then(|| NewestCamera {
             generation: progress.generation,
             asked: progress.asked,
             scene: progress.scene.clone(),

@@ -8,7 +8,7 @@ use serde_json::Value;
 use super::report::Counts;
 use crate::film::Film;
 
-/// What the device thread hands to the developer of a job's frames.
+/// What an executor leaves for the encoder of a job's frames.
 pub(crate) struct Snapshot {
     /// What it says of itself, without its pixels.
     pub film: Arc<Film>,

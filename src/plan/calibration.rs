@@ -13,12 +13,12 @@ use crate::error::Result;
 use crate::render::region::Region;
 use crate::technique::{self, Kind};
 
-/// Side of the picture, how far apart the pixels of its pilot are, and samples of both.
+/// Side of the picture, the stride of its pilot, and samples of both.
 const LARGE: u32 = 256;
-const APART: u32 = 4;
+const STRIDE: u32 = 4;
 const SAMPLES: u32 = 12;
 /// Pixels of the pilot and of the whole picture, between which is interpolated.
-const PIXELS: [f64; 2] = [((LARGE / APART) * (LARGE / APART)) as f64, (LARGE * LARGE) as f64];
+const PIXELS: [f64; 2] = [((LARGE / STRIDE) * (LARGE / STRIDE)) as f64, (LARGE * LARGE) as f64];
 
 /// Factors of a device.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -110,16 +110,16 @@ async fn measure(planner: &Planner<'_>, technique: &str, mut request: Value) -> 
     request["technique"] = json!(technique);
     request["image"] = json!({"width": LARGE, "height": LARGE});
     let scene = planner.scene(&request)?;
-    let time = async |apart: u32| -> Result<[f64; 2]> {
+    let time = async |stride: u32| -> Result<[f64; 2]> {
         let mut least = [f64::INFINITY; 2];
         for seed in 0..4 {
-            let pilot = scene.clone().with_seed(seed).into_pilot(Region::every(apart, [LARGE, LARGE]), SAMPLES);
+            let pilot = scene.clone().with_seed(seed).into_pilot(Region::every(stride, [LARGE, LARGE]), SAMPLES);
             let run = run::finish(planner, pilot).await?;
             least = [least[0].min(run.ms[0]), least[1].min(run.ms[1] / run.pixels as f64)];
         }
         Ok(least)
     };
-    let ([_, sparse], [besides, dense]) = (time(APART).await?, time(1).await?);
+    let ([_, sparse], [besides, dense]) = (time(STRIDE).await?, time(1).await?);
     let known = sparse > 0.0 && dense > 0.0;
     Ok(Factors {
         large_over_pilot: if known { (dense / sparse).clamp(0.1, 10.0) } else { 1.0 },

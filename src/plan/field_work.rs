@@ -115,7 +115,7 @@ impl Simulated {
         let per_piece = 1.0 / self.few as f64 + 1.0 / self.work as f64;
         let squared = mean(apart.iter().copied()).max(0.0) / pilot.scale.powi(2) / per_piece;
         // Pixels of one voxel are one.
-        let alike = (pixels_per_voxel / f64::from(region.apart)).max(1.0).powi(2);
+        let alike = (pixels_per_voxel / f64::from(region.stride)).max(1.0).powi(2);
         Ok(FieldWork {
             of: self.asked.work.of,
             squared,

@@ -86,7 +86,7 @@ impl Found {
                 setting: setting.clone(),
                 random,
                 // There are more pixels in the picture, of the same kinds.
-                chance: chance(seen * f64::from(region.apart).powi(2), seen * a.len() as f64),
+                chance: chance(seen * f64::from(region.stride).powi(2), seen * a.len() as f64),
                 bias,
                 bias_within,
                 scale,
@@ -160,7 +160,7 @@ impl Found {
     async fn look_closer(&mut self, asked: Asked<'_>, setting: &Setting, seen: &WholePicture) -> Result<()> {
         let by_chance = seen.random / f64::from(asked.image()[0]).sqrt() / f64::from(asked.image()[1]).sqrt();
         // A pilot that has all of the pixels has seen it.
-        let all = Region::some(PIXELS, [0, 0], asked.image()).apart == 1;
+        let all = Region::some(PIXELS, [0, 0], asked.image()).stride == 1;
         if all || self.part.is_some() || seen.missed <= (SURE * by_chance).max(SMALL * seen.random) {
             return Ok(());
         }
@@ -252,7 +252,7 @@ mod tests {
             missed[y * 100 + x] = 5.0;
         }
         let found = around(&missed, image);
-        assert_eq!(found.map(|f| f.0), Some(Region { left_top: [69, 8], size: [5, 6], apart: 1 }));
+        assert_eq!(found.map(|f| f.0), Some(Region { left_top: [69, 8], size: [5, 6], stride: 1 }));
         assert!(found.is_some_and(|f| (f.1 - 1.0).abs() < 0.01), "{found:?}");
         let everywhere: Vec<f64> = (0..8000).map(|i| f64::from(i % 7 == 0)).collect();
         assert_eq!(around(&everywhere, image), None);

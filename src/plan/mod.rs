@@ -98,7 +98,7 @@ impl Planner<'_> {
         considered.splice(0..0, chosen.considered.into_iter().chain(found.skipped));
         let best = &found.pilots[chosen.index];
         let mut request = reply::request(body, &best.setting);
-        request["budget"] = budget(best, &seen.scene, &chosen.amount, chosen.enough && work.is_none(), target)?;
+        request["budget"] = budget(best, &seen.scene, &chosen.amount, chosen.enough && work.is_none(), target);
         if let Some((simulated, work)) = seen.simulated.as_ref().zip(chosen.amount.work) {
             simulated.put_into(&mut request, work.amount);
         }
@@ -249,15 +249,15 @@ fn technique_of(body: &Value) -> &'static Technique {
 
 /// A plan's samples are enough by what the pilots know; where the film finds that it is so sooner, the render stops. A stepping view that
 /// finds its step too long starts over with a shorter one, which the plan knows better.
-fn budget(best: &Pilot, scene: &Scene, amount: &choose::Amount, enough: bool, target: Target) -> Result<Value> {
+fn budget(best: &Pilot, scene: &Scene, amount: &choose::Amount, enough: bool, target: Target) -> Value {
     let room = (choose::AIM * target.error).powi(2) - (best.bias + best.bias_within).powi(2);
     let mut budget = json!({"samples": amount.samples});
-    let is_random = scene.with_setting(&best.setting)?.view().random().is_some();
-    if enough && is_random && room > 0.0 && amount.samples >= FEW {
+    let view = best.setting.view.as_ref().unwrap_or(scene.view());
+    if enough && view.random().is_some() && room > 0.0 && amount.samples >= FEW {
         budget["max_error"] = json!(room.sqrt() / best.chance);
     }
     if let Some(time) = target.time_ms {
         budget["time_ms"] = json!(time as u64);
     }
-    Ok(budget)
+    budget
 }

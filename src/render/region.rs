@@ -7,19 +7,19 @@ pub(crate) struct Region {
     pub left_top: [u32; 2],
     /// Its sides, pixels of the picture.
     pub size: [u32; 2],
-    /// How far apart its pixels are.
-    pub apart: u32,
+    /// Every so manyth pixel of the picture, across and down.
+    pub stride: u32,
 }
 
 impl Region {
-    /// Every `apart`-th pixel of a picture.
-    pub fn every(apart: u32, image: [u32; 2]) -> Self {
-        Self { left_top: [0, 0], size: image, apart: apart.max(1) }
+    /// Every `stride`-th pixel of a picture.
+    pub fn every(stride: u32, image: [u32; 2]) -> Self {
+        Self { left_top: [0, 0], size: image, stride: stride.max(1) }
     }
 
     /// About so many pixels, evenly spread over a part of a picture; all of a small one.
     pub fn some(pixels: f64, left_top: [u32; 2], size: [u32; 2]) -> Self {
-        let apart = (f64::from(size[0]) * f64::from(size[1]) / pixels).sqrt().round().max(1.0) as u32;
-        Self { left_top, size, apart }
+        let stride = (f64::from(size[0]) * f64::from(size[1]) / pixels).sqrt().round().max(1.0) as u32;
+        Self { left_top, size, stride }
     }
 }

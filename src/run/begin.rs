@@ -22,7 +22,7 @@ impl Live {
             return Ok(());
         }
         let seen = self.camera.as_ref().map(|camera| camera.generation);
-        let Some(mut camera) = self.job.next_turn(seen) else { return Ok(()) };
+        let Some(mut camera) = self.job.newest_camera(seen) else { return Ok(()) };
         camera.frame_ms.take().into_iter().for_each(|took| self.motion.learn(took));
         let complete = camera.complete_field.take();
         let moves = camera.generation > 0;

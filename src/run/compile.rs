@@ -38,7 +38,7 @@ impl Compiler {
     /// The one for a device that was opened with `config` and so many lanes; none where the configuration names no program.
     pub fn of(config: &DeviceConfig, lanes: u32) -> Option<Self> {
         let program = config.compiler.clone()?;
-        let mut flags = vec![format!("--device={}", config.wish), format!("--lanes={lanes}")];
+        let mut flags = vec![format!("--device={}", config.target), format!("--lanes={lanes}")];
         flags.extend(config.images.map(|images| format!("--volume-images={images}")));
         flags.extend(config.kernels.as_ref().map(|folder| format!("--kernels={}", folder.display())));
         Some(Self { program, flags })

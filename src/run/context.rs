@@ -23,7 +23,7 @@ const IDLE_VOLUME_BYTES: usize = 1 << 30;
 /// Everything on the device that outlives a job.
 pub(super) struct DeviceContext {
     pub device: Device,
-    /// That films are developed by.
+    /// The curve of sRGB, which films are encoded by.
     pub curve: Rc<Buffer>,
     volumes: HashMap<usize, (Weak<Volume>, Rc<DeviceVolume>)>,
     /// Rays a millisecond of the last pass, by kernel variant.

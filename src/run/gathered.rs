@@ -49,8 +49,8 @@ pub(super) struct Gathered {
     opacity_threshold: f64,
     background: Background,
     encoder: Encoder,
-    /// What was developed last, as long as it is what there is to see.
-    developed: Option<Film>,
+    /// What was encoded last, as long as it is what there is to see.
+    encoded: Option<Film>,
     /// What the kernels had counted then.
     pub counted: SampleCounts,
 }
@@ -68,7 +68,7 @@ impl Gathered {
         before: Option<Self>,
     ) -> Result<Self> {
         let region = scene.region();
-        let size = region.size.map(|n| n.div_ceil(region.apart) as usize);
+        let size = region.size.map(|n| n.div_ceil(region.stride) as usize);
         let (room, encoder) = before.map(|b| (b.layers.map(|l| l.buffer).into(), b.encoder)).unzip();
         let encoder = Encoder::new(&mut context.device, &context.curve, size, scene.background(), encoder)?;
         let device = &context.device;
@@ -93,7 +93,7 @@ impl Gathered {
             opacity_threshold: plan.opacity_threshold,
             background: scene.background(),
             encoder,
-            developed: None,
+            encoded: None,
             counted: SampleCounts::default(),
         })
     }
@@ -103,7 +103,7 @@ impl Gathered {
         context.device.write(&mut self.counts, 0, &[0; 32])?;
         self.layers.iter_mut().try_for_each(|layer| layer.restart(&context.device))?;
         self.rounds.forget();
-        (self.field_error, self.developed) = (None, None);
+        (self.field_error, self.encoded) = (None, None);
         Ok(())
     }
 
@@ -163,20 +163,20 @@ impl Gathered {
 
     /// What there is to see is about to be another.
     pub fn will_change(&mut self) {
-        self.developed = None;
+        self.encoded = None;
     }
 
-    /// Develops what there is to see, unless that has been done: what it says of itself, without its pixels.
-    pub fn develop(&mut self, context: &DeviceContext) -> Result<Film> {
-        let film = match self.developed.take() {
+    /// Encodes what there is to see, unless that has been done: what it says of itself, without its pixels.
+    pub fn encode(&mut self, context: &DeviceContext) -> Result<Film> {
+        let film = match self.encoded.take() {
             Some(film) => film,
-            None => self.develop_anew(context)?,
+            None => self.encode_anew(context)?,
         };
-        self.developed = Some(film.clone());
+        self.encoded = Some(film.clone());
         Ok(Film { field_error: self.field_error, ..film })
     }
 
-    fn develop_anew(&mut self, context: &DeviceContext) -> Result<Film> {
+    fn encode_anew(&mut self, context: &DeviceContext) -> Result<Film> {
         let pass = self.shown();
         // Of one sample a pixel has no deviation: it tells only where that sample was not finite.
         self.counted = self.read_counts(context)?;
@@ -197,7 +197,7 @@ impl Gathered {
         let twice = if self.stepless { 1.0 } else { 2.0 };
         let (lowered, step_loss) = match (pass, moving) {
             (Pass::Moving, Some(moving)) => (moving.lowered, Some(moving.step_loss)),
-            (Pass::Control, _) => (Lowered { apart: layers[0].stride as u32, step: twice }, None),
+            (Pass::Control, _) => (Lowered { stride: layers[0].stride as u32, step: twice }, None),
             _ => (Lowered::default(), None),
         };
         Ok(Film {
@@ -218,14 +218,14 @@ impl Gathered {
         })
     }
 
-    /// The bytes of the picture that was developed last.
+    /// The bytes of the picture that was encoded last.
     pub fn picture(&self, context: &DeviceContext) -> Result<Vec<u8>> {
         self.encoder.picture(&context.device)
     }
 
     /// What there is to see, with its pixels.
     pub fn film(&mut self, context: &DeviceContext) -> Result<Film> {
-        let mut film = self.develop(context)?;
+        let mut film = self.encode(context)?;
         let deviations = film.main.count > 1 || film.main.tiles.is_some() || film.sums.unknown > 0;
         film.main = self.layer(self.shown()).read(context, deviations)?;
         film.control = film.control.map(|_| self.layers[0].read(context, false)).transpose()?;

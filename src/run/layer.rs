@@ -16,8 +16,8 @@ pub(super) struct Layer {
     pub width: usize,
     pub height: usize,
     pub stride: usize,
-    /// How far apart its pixels are in the picture asked for: further than in the film's where that is a pilot's.
-    pub apart: usize,
+    /// The same in the picture asked for: longer than in the film's where that is a pilot's.
+    pub picture_stride: usize,
     pub samples: u32,
     /// The kernel's table for its step.
     pub table: Rc<Buffer>,
@@ -44,8 +44,8 @@ impl Layer {
         room: Option<Buffer>,
     ) -> Result<Self> {
         let region = scene.region();
-        let apart = stride * region.apart as usize;
-        let [width, height] = region.size.map(|n| (n as usize).div_ceil(apart));
+        let picture_stride = stride * region.stride as usize;
+        let [width, height] = region.size.map(|n| (n as usize).div_ceil(picture_stride));
         let tiled = |_| -> Result<_> {
             let tiling = Tiling::new(width, height);
             let buffer = device.upload(&vec![0; tiling.room()], 0)?;
@@ -53,7 +53,7 @@ impl Layer {
         };
         let tiling = scene.view().random().map(tiled).transpose()?;
         let buffer = device.allocate_in(room, 20 * width * height + PADDING)?;
-        Ok(Self { buffer, width, height, stride, apart, samples: 0, table, step, stream, tiling })
+        Ok(Self { buffer, width, height, stride, picture_stride, samples: 0, table, step, stream, tiling })
     }
 
     /// Forgets what was gathered.

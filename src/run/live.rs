@@ -10,7 +10,7 @@ use super::motion::Motion;
 use super::view_run::ViewRun;
 use crate::error::{Error, Result};
 use crate::film::Film;
-use crate::job::{self, Job};
+use crate::job::{Job, NewestCamera};
 use crate::technique::ViewPlan;
 use crate::volume::Volume;
 
@@ -79,7 +79,7 @@ pub(super) struct Live {
     pub(super) job: Arc<Job>,
     pub(super) stage: Stage,
     /// The camera that is worked on; none before the first turn.
-    pub(super) camera: Option<job::Turn>,
+    pub(super) camera: Option<NewestCamera>,
     pub(super) started: Instant,
     pub(super) field: Option<FieldRun>,
     pub(super) view: Option<ViewRun>,

@@ -21,7 +21,7 @@ const MOST_LOSS: f64 = 0.09;
 /// How much the device's part may change from one frame to the next: down at once, up slowly, so that pictures do not change to and fro.
 const CHANGE: [f64; 2] = [0.9, 1.03];
 /// Pixels that a sample stands for along a side, at most.
-const MOST_APART: u32 = 16;
+const MOST_STRIDE: u32 = 16;
 /// Steps that are tried, of the one asked for.
 const STEPS: [f32; 3] = [1.0, 2.0, 4.0];
 
@@ -108,10 +108,10 @@ impl Motion {
 }
 
 impl Lowered {
-    /// The part of the time that is left, as it was measured on two scans, lit and not: rays that are further apart have less in common, and
+    /// The part of the time that is left, as it was measured on two scans, lit and not: rays that are further from each other have less in common, and
     /// longer steps share what a ray costs besides.
     fn cost(&self) -> f64 {
-        f64::from(self.apart).powf(-1.4) * f64::from(self.step).powf(-0.7)
+        f64::from(self.stride).powf(-1.4) * f64::from(self.step).powf(-0.7)
     }
 }
 
@@ -133,7 +133,7 @@ impl Losses {
 
     /// What is lost; edges are assumed of the pixels.
     fn of_lowered(&self, lowered: Lowered) -> f64 {
-        let pixels = self.resolution * f64::from(lowered.apart - 1);
+        let pixels = self.resolution * f64::from(lowered.stride - 1);
         pixels.hypot(self.of_step(lowered.step))
     }
 
@@ -146,7 +146,7 @@ impl Losses {
     /// need be.
     fn least(&self, rays: f64, ray_ms: f64, device_ms: f64) -> Lowered {
         let steps = if self.step.is_some() { &STEPS[..] } else { &STEPS[..1] };
-        let all = (1..=MOST_APART).flat_map(|apart| steps.iter().map(move |step| Lowered { apart, step: *step }));
+        let all = (1..=MOST_STRIDE).flat_map(|stride| steps.iter().map(move |step| Lowered { stride, step: *step }));
         let cost = |l: &Lowered| rays * ray_ms * l.cost();
         let in_time = all.clone().filter(|l| cost(l) <= device_ms);
         let least = in_time.min_by(|a, b| self.of_lowered(*a).total_cmp(&self.of_lowered(*b)));
@@ -183,7 +183,7 @@ impl Moving {
             }
             _ => {
                 let room = before.map(|b| b.layer.buffer);
-                Layer::new(&context.device, scene, table, lowered.apart as usize, STREAM, lowered.step * step, room)?
+                Layer::new(&context.device, scene, table, lowered.stride as usize, STREAM, lowered.step * step, room)?
             }
         };
         Ok(Self { layer, lowered, step_loss })
@@ -203,15 +203,15 @@ mod tests {
     fn what_matters_least_is_lowered_and_no_more_than_need_be() {
         let losses = Losses { resolution: 0.02, step: Some(0.001) };
         // 100 rays of a millisecond for 40: a step of four times leaves 38 and loses 0.5 %.
-        assert_eq!(losses.least(100.0, 1.0, 40.0), Lowered { apart: 1, step: 4.0 });
-        assert_eq!(losses.least(100.0, 0.2, 30.0), Lowered { apart: 1, step: 1.0 });
+        assert_eq!(losses.least(100.0, 1.0, 40.0), Lowered { stride: 1, step: 4.0 });
+        assert_eq!(losses.least(100.0, 0.2, 30.0), Lowered { stride: 1, step: 1.0 });
         // 2 % of every second pixel against 10 % and more of a longer step.
         let rough = Losses { resolution: 0.02, step: Some(0.1) };
-        assert_eq!(rough.least(100.0, 1.0, 40.0), Lowered { apart: 2, step: 1.0 });
+        assert_eq!(rough.least(100.0, 1.0, 40.0), Lowered { stride: 2, step: 1.0 });
         let stepless = Losses { resolution: 0.02, step: None };
-        assert_eq!(stepless.least(200.0, 1.0, 30.0), Lowered { apart: 4, step: 1.0 });
+        assert_eq!(stepless.least(200.0, 1.0, 30.0), Lowered { stride: 4, step: 1.0 });
         // Nothing is in time: the cheapest that there is.
-        assert_eq!(losses.least(1e9, 1.0, 30.0), Lowered { apart: MOST_APART, step: 4.0 });
+        assert_eq!(losses.least(1e9, 1.0, 30.0), Lowered { stride: MOST_STRIDE, step: 4.0 });
     }
 
     /// Motion that knows what the parts of a picture are worth.
@@ -224,9 +224,9 @@ mod tests {
         let mut motion = motion(Losses { resolution: 0.001, step: None });
         let first = motion.least(1e6, 1e-4, true).0;
         (0..5).for_each(|_| motion.learn(90.0));
-        assert!(motion.least(1e6, 1e-4, true).0.apart > first.apart);
+        assert!(motion.least(1e6, 1e-4, true).0.stride > first.stride);
         (0..100).for_each(|_| motion.learn(5.0));
-        assert!(motion.least(1e6, 1e-4, true).0.apart <= first.apart);
+        assert!(motion.least(1e6, 1e-4, true).0.stride <= first.stride);
         assert!(motion.least(1e4, 1e-4, true).0.is_none(), "what is in time as it is stays as it is");
     }
 
@@ -235,7 +235,7 @@ mod tests {
         // 30 ms of rays for 13 ms: a step of four times.
         let mut gentle = motion(Losses { resolution: 0.5, step: Some(0.01) });
         let (lowered, loss) = gentle.least(3e5, 1e-4, false);
-        assert_eq!(lowered, Lowered { apart: 1, step: 4.0 });
+        assert_eq!(lowered, Lowered { stride: 1, step: 4.0 });
         assert!((loss - 0.05).abs() < 1e-12);
         assert!(gentle.is_smooth);
         // A step of twice would do for 20 ms, and lose 20 %: all of it, 30 times a second.

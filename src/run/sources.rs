@@ -18,7 +18,7 @@ pub(super) fn source_of(variant: &Variant) -> Result<Source> {
 }
 
 /// What the first picture needs, most likely: the first technique on words, which the floats of built-in volumes are taken as, and on
-/// bytes, and what films are developed by.
+/// bytes, and what films are encoded by.
 pub(super) fn first() -> Vec<Variant> {
     let views = technique::ALL.first().map_or(Vec::new(), |t| ((t.source)().variants)());
     let of =

@@ -30,7 +30,7 @@ pub(super) fn next(view: &mut ViewRun, started: Instant, context: &DeviceContext
     }
     let enough = samples >= if view.is_random() { Random::LEAST_SAMPLES } else { 2 };
     let Some(most) = budget.max_error.filter(|_| enough && is_round(samples)) else { return Ok(Next::GoOn) };
-    let error = view.gathered.develop(context)?.error();
+    let error = view.gathered.encode(context)?.error();
     let noise = error.noise.unwrap_or(0.0);
     let bias = (error.total.powi(2) - noise.powi(2)).max(0.0).sqrt();
     if error.total <= most {

@@ -281,7 +281,7 @@ impl ViewRun {
         let view = DeviceView {
             width: layer.width as i32,
             height: layer.height as i32,
-            stride: layer.apart as i32,
+            stride: layer.picture_stride as i32,
             sample: layer.samples as i32,
             stream: layer.stream,
             offset: sample_offset(layer.samples).to_array(),

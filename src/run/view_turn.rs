@@ -91,7 +91,7 @@ impl Live {
     /// Learns what a lower resolution and a longer step would lose, for when the camera moves.
     fn learn_losses(&mut self, context: &DeviceContext) -> Result<()> {
         if let (Some(view), true) = (&mut self.view, self.job.is_followed()) {
-            self.motion.see(&view.gathered.develop(context)?);
+            self.motion.see(&view.gathered.encode(context)?);
         }
         Ok(())
     }
@@ -124,7 +124,7 @@ impl Live {
         let (Some(view), Some(camera)) = (&mut self.view, &self.camera) else { return Ok(()) };
         let field = self.field.as_ref();
         view.gathered.field_error = field.and_then(|f| f.error);
-        let film = view.gathered.develop(context)?;
+        let film = view.gathered.encode(context)?;
         let device_time = self.earlier_time + view.device_time + field.map_or(Duration::ZERO, |f| f.device_time);
         self.job.leave_snapshot(Snapshot {
             film: Arc::new(film),

@@ -5,6 +5,7 @@
 
 pub mod engine;
 pub mod light;
+pub mod picture;
 pub mod pictures;
 pub mod processes;
 

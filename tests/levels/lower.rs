@@ -6,6 +6,7 @@ use std::process::{Command, Output};
 use serde_json::Value;
 
 use super::common;
+use super::common::picture::Picture;
 use super::compiler::{LEVELS, Level};
 
 /// A level that a higher one can be made to work at.
@@ -22,12 +23,6 @@ const LOWER: [Lower; 3] = [
     Lower { level: &LEVELS[2], hidden: "avx512,avx2", cpus: &["sandybridge", "ivybridge", "bdver1"] },
     Lower { level: &LEVELS[3], hidden: "avx512,avx", cpus: &["penryn", "core2", "x86-64"] },
 ];
-
-/// A picture in linear floats and in bytes.
-pub struct Picture {
-    pub values: Vec<[f32; 3]>,
-    pub bytes: Vec<u8>,
-}
 
 /// The program and what hides features from it.
 pub struct Program {
@@ -109,12 +104,7 @@ impl Program {
         for name in ["out.exr", "out.png"] {
             succeeded(self.command("render", lower).arg(path("scene.json")).arg("-o").arg(path(name)));
         }
-        let picture = exr::prelude::read_first_rgba_layer_from_file(
-            path("out.exr"),
-            |size, _| (size.width(), vec![[0.0f32; 3]; size.width() * size.height()]),
-            |(width, pixels), at, (r, g, b, _): (f32, f32, f32, f32)| pixels[at.y() * *width + at.x()] = [r, g, b],
-        );
-        let values = picture.unwrap().layer_data.channel_data.pixels.1;
-        Picture { values, bytes: image::open(path("out.png")).unwrap().to_rgb8().into_raw() }
+        let [exr, png] = ["out.exr", "out.png"].map(|name| std::fs::read(path(name)).unwrap());
+        Picture::read(&exr, &png)
     }
 }

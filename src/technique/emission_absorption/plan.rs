@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::pieces::pieces;
 use super::{EmissionAbsorption, Parameters, TECHNIQUE, regions};
 use crate::device::Resume;
-use crate::device::program::{Source, Variant, listed};
+use crate::device::program::{Source, Variant, each_voxel_type, listed};
 use crate::device::structs::{DeviceStruct, View as DeviceView};
 use crate::error::Result;
 use crate::scene::camera::Camera;
@@ -71,17 +71,13 @@ fn permitted(wanted: Features) -> Result<&'static Features> {
     listed(TECHNIQUE.name, &FEATURES, wanted)
 }
 
-fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
-    Variant::new(TECHNIQUE.name, Some(voxel), features)
-}
-
 pub(super) fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
         structs: || {
             view_text() + &EmissionAbsorption::opencl_text() + &Resume::opencl_text_of_beams("RADIANCE", STATE_WORDS)
         },
-        variants: || FEATURES.iter().flat_map(|f| VoxelType::ALL.map(|t| variant(t, f))).collect(),
+        variants: || each_voxel_type(TECHNIQUE.name, &FEATURES),
         common: COMMON * VoxelType::ALL.len(),
     }
 }
@@ -176,7 +172,7 @@ impl View for Parameters {
         }
         let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
         Ok(ViewPlan {
-            variant: variant(volume.voxels().voxel_type(), self.features()?),
+            variant: Variant::new(TECHNIQUE.name, Some(volume.voxel_type()), self.features()?),
             cells: if skip { CellUse::Distances(opaque) } else { CellUse::None },
             step: (self.step_voxels * smallest) as f32,
             state_words: STATE_WORDS,

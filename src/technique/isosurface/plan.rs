@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::surfaces::{self, Surface};
 use super::{Isosurface, Normals, Output, Parameters, Sampling, TECHNIQUE};
 use crate::device::Resume;
-use crate::device::program::{Source, Variant, listed};
+use crate::device::program::{Source, Variant, each_voxel_type, listed};
 use crate::device::structs::{DeviceStruct, View as DeviceView};
 use crate::error::Result;
 use crate::scene;
@@ -53,15 +53,11 @@ fn permitted(wanted: Features) -> Result<&'static Features> {
     listed(TECHNIQUE.name, &FEATURES, wanted)
 }
 
-fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
-    Variant::new(TECHNIQUE.name, Some(voxel), features)
-}
-
 pub(super) fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
         structs: || view_text() + &Isosurface::opencl_text() + &Resume::opencl_text_of_beams("SEARCH", STATE_WORDS),
-        variants: || FEATURES.iter().flat_map(|f| VoxelType::ALL.map(|t| variant(t, f))).collect(),
+        variants: || each_voxel_type(TECHNIQUE.name, &FEATURES),
         common: VoxelType::ALL.len(),
     }
 }
@@ -115,7 +111,7 @@ impl View for Parameters {
             reasons.push("every sample is taken: skipping is off".into());
         }
         Ok(ViewPlan {
-            variant: variant(volume.voxel_type(), features),
+            variant: Variant::new(TECHNIQUE.name, Some(volume.voxel_type()), features),
             cells: if self.empty_space_skipping { CellUse::Distances(self.wanted(&surfaces)) } else { CellUse::None },
             step: (self.step_voxels * smallest) as f32,
             state_words: STATE_WORDS,

@@ -7,7 +7,7 @@ use serde_json::Value;
 use super::{DeviceMode, Mode, Parameters, Projection, TECHNIQUE};
 use crate::device::Resume;
 use crate::device::enums::DeviceEnum;
-use crate::device::program::{Source, Variant, listed};
+use crate::device::program::{Source, Variant, each_voxel_type, listed};
 use crate::device::structs::{DeviceStruct, View as DeviceView};
 use crate::error::Result;
 use crate::scene;
@@ -51,10 +51,6 @@ fn permitted(wanted: Features) -> Result<&'static Features> {
     listed(TECHNIQUE.name, &FEATURES, wanted)
 }
 
-fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
-    Variant::new(TECHNIQUE.name, Some(voxel), features)
-}
-
 pub(super) fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
@@ -64,7 +60,7 @@ pub(super) fn source() -> Source {
                 + &DeviceMode::opencl_text()
                 + &Resume::opencl_text_of_beams("PROJECTION_BEAM", STATE_WORDS)
         },
-        variants: || FEATURES.iter().flat_map(|f| VoxelType::ALL.map(|t| variant(t, f))).collect(),
+        variants: || each_voxel_type(TECHNIQUE.name, &FEATURES),
         common: 2 * VoxelType::ALL.len(),
     }
 }
@@ -145,7 +141,7 @@ impl View for Parameters {
             reasons.push(format!("extinction {sigma:.4e} per unit and value above {zero}"));
         }
         Ok(ViewPlan {
-            variant: variant(volume.voxel_type(), features),
+            variant: Variant::new(TECHNIQUE.name, Some(volume.voxel_type()), features),
             cells: CellUse::Ranges,
             step: (if self.walked() { 1.0 } else { self.step_voxels } * smallest) as f32,
             state_words: STATE_WORDS,

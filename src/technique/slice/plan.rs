@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::{Mode, Parameters, Plane, Slice, TECHNIQUE};
-use crate::device::program::{Source, Variant, listed};
+use crate::device::program::{Source, Variant, each_voxel_type, listed};
 use crate::device::structs::{DeviceStruct, View as DeviceView};
 use crate::error::Result;
 use crate::scene::camera::Camera;
@@ -29,15 +29,11 @@ fn permitted(wanted: Features) -> Result<&'static Features> {
     listed(TECHNIQUE.name, &FEATURES, wanted)
 }
 
-fn variant(voxel: VoxelType, features: &'static Features) -> Variant {
-    Variant::new(TECHNIQUE.name, Some(voxel), features)
-}
-
 pub(super) fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
         structs: || view_text() + &Slice::opencl_text(),
-        variants: || FEATURES.iter().flat_map(|f| VoxelType::ALL.map(|t| variant(t, f))).collect(),
+        variants: || each_voxel_type(TECHNIQUE.name, &FEATURES),
         common: VoxelType::ALL.len(),
     }
 }
@@ -72,7 +68,7 @@ impl View for Parameters {
         let features = permitted(wanted)?;
         let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
         Ok(ViewPlan {
-            variant: variant(volume.voxel_type(), features),
+            variant: Variant::new(TECHNIQUE.name, Some(volume.voxel_type()), features),
             cells: CellUse::None,
             step: smallest as f32,
             state_words: 0,
