@@ -30,7 +30,7 @@ fn variant(kernel: &'static str, voxel: VoxelType) -> Variant {
 }
 
 fn source(kernel: &'static str, variants: fn() -> Vec<Variant>) -> Source {
-    Source { kernel, structs: CellsPass::opencl_text, variants, common: VoxelType::ALL.len() }
+    Source { kernel, words: String::new, structs: || vec![CellsPass::LAYOUT], variants, common: VoxelType::ALL.len() }
 }
 
 /// The kernels of the cells.

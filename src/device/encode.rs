@@ -86,7 +86,8 @@ fn variant(whole: bool) -> Variant {
 pub fn source() -> Source {
     Source {
         kernel: "encode",
-        structs: || Encode::opencl_text() + &FilmSum::opencl_text() + &ControlSum::opencl_text(),
+        words: String::new,
+        structs: || vec![Encode::LAYOUT, FilmSum::LAYOUT, ControlSum::LAYOUT],
         variants: || [true, false].map(variant).to_vec(),
         common: 2,
     }

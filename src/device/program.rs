@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::enums::DeviceEnum;
 use super::include::{assemble, read};
+use super::structs::Layout;
 use crate::error::{Error, Result};
 use crate::volume::VoxelType;
 
@@ -58,8 +59,10 @@ pub struct Variant {
 pub struct Source {
     /// The kernel file's name, without `.cl`.
     pub kernel: &'static str,
-    /// The OpenCL C text of its device structs and enums.
-    pub structs: fn() -> String,
+    /// OpenCL C text before everything else: enums, numbers, extensions.
+    pub words: fn() -> String,
+    /// The structs that it shares with the host.
+    pub structs: fn() -> Vec<Layout>,
     /// Every variant that may be built.
     pub variants: fn() -> Vec<Variant>,
     /// The number of variants, from the first, that are built before the service is ready; the others are built when first asked for.
@@ -73,7 +76,8 @@ impl Source {
     /// [`Error::Internal`] when a file is missing, or files include each other in a circle.
     pub fn text(&self, overrides: Option<&Path>) -> Result<String> {
         let kernel = assemble(&format!("{}.cl", self.kernel), &|name| read(overrides, name))?;
-        Ok(format!("#line 1 \"structs\"\n{}{}{kernel}", VoxelType::opencl_text(), (self.structs)()))
+        let structs: String = (self.structs)().iter().map(|layout| (layout.opencl_text)()).collect();
+        Ok(format!("#line 1 \"structs\"\n{}{}{structs}{kernel}", VoxelType::opencl_text(), (self.words)()))
     }
 }
 

@@ -34,6 +34,22 @@ pub trait DeviceStruct: bytemuck::Pod {
     fn offsets() -> Vec<(&'static str, usize)>;
     /// The OpenCL C `typedef`.
     fn opencl_text() -> String;
+    /// All of this, as data.
+    const LAYOUT: Layout =
+        Layout { name: Self::NAME, offsets: Self::offsets, size: size_of::<Self>(), opencl_text: Self::opencl_text };
+}
+
+/// How a struct that the host and the device share lies in memory: a [`DeviceStruct`] as data.
+#[derive(Debug, Clone, Copy)]
+pub struct Layout {
+    /// Its name in Rust and in OpenCL C.
+    pub name: &'static str,
+    /// The name and byte offset of every field, in order.
+    pub offsets: fn() -> Vec<(&'static str, usize)>,
+    /// Its size in bytes.
+    pub size: usize,
+    /// The OpenCL C `typedef`.
+    pub opencl_text: fn() -> String,
 }
 
 /// Declares a struct for host and device: `device_struct! { /// words pub struct Name { field: [f32; 3], … } }`.

@@ -33,6 +33,7 @@ use tokio::sync::{oneshot, watch};
 
 pub use compile::compile_kernels;
 use device_thread::{Command, DeviceThread};
+pub use sources::sources;
 use kernels::Kernels;
 
 use crate::config::Limits;

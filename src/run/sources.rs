@@ -7,7 +7,7 @@ use crate::technique;
 use crate::volume::VoxelType;
 
 /// Every kernel that there is.
-pub(super) fn sources() -> impl Iterator<Item = Source> {
+pub fn sources() -> impl Iterator<Item = Source> {
     technique::ALL.iter().map(|t| (t.source)()).chain(cells::sources()).chain([encode::source()])
 }
 

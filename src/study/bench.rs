@@ -77,8 +77,15 @@ impl Bench {
     /// # Errors
     /// [`crate::error::Error::Internal`] when the device or the folder cannot be used.
     pub fn new(args: &DeviceArgs, limits: Limits) -> Result<Self> {
+        Self::of(Service::start(args.device_config(), &args.data_dir(), limits)?)
+    }
+
+    /// A bench on a service that runs already. Must be called as [`Bench::new`].
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Internal`] when its device failed.
+    pub fn of(service: Service) -> Result<Self> {
         let handle = Handle::current();
-        let service = Service::start(args.device_config(), &args.data_dir(), limits)?;
         let device = handle.block_on(service.engine().ready())?;
         Ok(Self { service, handle, device })
     }

@@ -30,6 +30,7 @@
 //!
 //! Example: see [`example`], which a test runs.
 
+mod cases;
 pub mod pieces;
 pub mod plan;
 pub mod regions;
@@ -59,6 +60,7 @@ pub const TECHNIQUE: Technique = Technique {
     example,
     source: plan::source,
     shares: &[],
+    cases: cases::cases,
     kind: Kind::View { parse, complete: "emission_absorption", calibration: Some(super::smoke) },
 };
 

@@ -24,6 +24,7 @@
 //!
 //! Example: see [`example`], which a test runs.
 
+mod cases;
 pub mod plan;
 pub mod surfaces;
 
@@ -49,6 +50,7 @@ pub const TECHNIQUE: Technique = Technique {
     example,
     source: plan::source,
     shares: &[],
+    cases: cases::cases,
     kind: Kind::View { parse, complete: "isosurface", calibration: Some(super::smoke) },
 };
 

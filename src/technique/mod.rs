@@ -1,5 +1,6 @@
 //! The techniques: the trait of each kind and the one list. A technique is three files of one name and one line here.
 
+mod case;
 pub mod emission_absorption;
 mod field;
 pub mod isosurface;
@@ -23,10 +24,10 @@ use serde_json::Value;
 use crate::config::Limits;
 use crate::device::enums::{Count, DeviceEnum};
 use crate::device::program::Source;
-use crate::device::structs::{DeviceStruct, View as DeviceView};
 use crate::error::Result;
 use crate::scene::interpolation::Interpolation;
 use crate::volume::Store;
+pub use case::{Case, Cases};
 pub use field::{Field, Look, Process, Progress, Step};
 pub use view::{CellUse, Open, Random, Setting, Settings, View, ViewPlan};
 
@@ -49,9 +50,9 @@ impl DeviceEnum for Interpolation {
     }
 }
 
-/// The OpenCL C text that all views share: the camera and the pass, and the names of interpolations and counts.
-pub(crate) fn view_text() -> String {
-    DeviceView::opencl_text() + &Interpolation::opencl_text() + &Count::opencl_text()
+/// The names that all views' kernels share: of interpolations and counts.
+pub(crate) fn view_words() -> String {
+    Interpolation::opencl_text() + &Count::opencl_text()
 }
 
 /// The description of a technique.
@@ -68,6 +69,8 @@ pub struct Technique {
     pub source: fn() -> Source,
     /// Sections of the request that it shares with other techniques, in place of its own parameters of those names.
     pub shares: &'static [&'static str],
+    /// What tests run of it.
+    pub cases: fn() -> Cases,
     /// Its kind, with its parser: parameters and their JSON pointer.
     pub kind: Kind,
 }

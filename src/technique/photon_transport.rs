@@ -36,6 +36,7 @@
 //! Example: see [`example`], which a test runs.
 
 pub mod attenuation;
+mod cases;
 mod clearance;
 mod device;
 mod gammas;
@@ -80,6 +81,7 @@ pub const TECHNIQUE: Technique = Technique {
     example,
     source,
     shares: &[],
+    cases: cases::cases,
     kind: Kind::Field {
         parse,
         work: Work { of: "photons", most: |limits| limits.max_photons, first: 20_000, looks: LOOKS_ON_THE_WAY },
@@ -102,18 +104,14 @@ pub fn example() -> Value {
 fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
-        structs: || {
+        words: || {
             "#pragma OPENCL EXTENSION cl_khr_int64_base_atomics : enable\n".to_owned()
-                + &[
-                    FieldPass::opencl_text(),
-                    PhotonTransport::opencl_text(),
-                    Resume::opencl_text("PHOTON", STATE_WORDS),
-                ]
-                .concat()
+                + &Resume::opencl_text("PHOTON", STATE_WORDS)
                 + &[Media::opencl_text(), MediumNumber::opencl_text(), PhaseKind::opencl_text()].concat()
                 + &[Tracking::opencl_text(), SourceKind::opencl_text(), BoundaryKind::opencl_text()].concat()
                 + &[Tally::opencl_text(), LedgerEntry::opencl_text()].concat()
         },
+        structs: || vec![FieldPass::LAYOUT, PhotonTransport::LAYOUT],
         variants: || plan::FEATURES.iter().map(|f| Variant::new(TECHNIQUE.name, None, f)).collect(),
         common: 2,
     }

@@ -32,6 +32,7 @@
 //!
 //! Example: see [`example`], which a test runs.
 
+mod cases;
 mod plan;
 
 use std::sync::Arc;
@@ -55,6 +56,7 @@ pub const TECHNIQUE: Technique = Technique {
     example,
     source: plan::source,
     shares: &[],
+    cases: cases::cases,
     kind: Kind::View { parse, complete: "projection", calibration: None },
 };
 

@@ -1,5 +1,6 @@
 //! The parameters of `single_scatter` and `volume_path`, and the plan made of them.
 
+mod cases;
 mod device;
 mod kernels;
 mod parameters;
@@ -9,6 +10,7 @@ mod settings;
 use serde_json::Value;
 
 use crate::request;
+pub(super) use cases::cases;
 pub use device::Scattering;
 pub(super) use kernels::source;
 pub(super) use parameters::Parameters;

@@ -24,6 +24,7 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 
+use super::case::{Cases, tiny};
 use super::scattering::{self, Parameters, Scatterer};
 use super::{Kind, Technique, View};
 use crate::device::program::Source;
@@ -38,6 +39,7 @@ pub const TECHNIQUE: Technique = Technique {
     example,
     source,
     shares: &["medium", "lights"],
+    cases,
     kind: Kind::View { parse, complete: "volume_path", calibration: Some(super::smoke) },
 };
 
@@ -54,6 +56,15 @@ pub fn example() -> Value {
         "budget": {"samples": 16},
         "single_scatter": {"medium": {"sigma_t_per_unit": 4}, "lights": [{"type": "point", "position": [0.4, 0.6, -0.8]}]}
     })
+}
+
+fn cases() -> Cases {
+    let own = json!({"tracking": "exact", "medium": {"sigma_t_per_unit": 2},
+        "lights": [{"type": "sun"}, {"type": "point", "position": [0, 0.5, 0]}, {"type": "sky"}]});
+    let mut request = tiny(TECHNIQUE.name, "sphere", 10, 2, &own);
+    // More than a tile.
+    request["image"]["width"] = json!(17);
+    scattering::cases(vec![request])
 }
 
 fn source() -> Source {

@@ -24,6 +24,7 @@
 //!
 //! Example: see [`example`], which a test runs.
 
+mod cases;
 mod plan;
 
 use std::sync::Arc;
@@ -48,6 +49,7 @@ pub const TECHNIQUE: Technique = Technique {
     example,
     source: plan::source,
     shares: &[],
+    cases: cases::cases,
     kind: Kind::View { parse, complete: "slice", calibration: None },
 };
 

@@ -27,6 +27,7 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 
+use super::case::{Cases, tiny};
 use super::scattering::{self, Parameters, Scatterer};
 use super::{Kind, Technique, View};
 use crate::device::program::Source;
@@ -41,6 +42,7 @@ pub const TECHNIQUE: Technique = Technique {
     example,
     source,
     shares: &["medium", "lights"],
+    cases,
     kind: Kind::View { parse, complete: "volume_path", calibration: Some(super::smoke) },
 };
 
@@ -57,6 +59,21 @@ pub fn example() -> Value {
         "budget": {"samples": 16},
         "volume_path": {"medium": {"sigma_t_per_unit": 12, "albedo": 0.95, "phase": {"type": "henyey_greenstein", "g": 0.5}}}
     })
+}
+
+/// Each kind of light, emission and colours; a surface that refracts: a homogeneous box.
+fn cases() -> Cases {
+    let table = json!({"type": "tabulated", "cosines": [-1, 0, 1], "densities": [1, 0, 2]});
+    let lights = json!([{"type": "sun"}, {"type": "sky"}, {"type": "point", "position": [0, 0, 0]},
+        {"type": "sphere", "position": [1, 1, 0], "radius": 0.5},
+        {"type": "quad", "corner": [0, 1, 0], "edge_u": [1, 0, 0], "edge_v": [0, 0, 1]}]);
+    let medium = json!({"sigma_t_per_unit": [2, 3, 4], "emission": 0.1, "phase": table});
+    let own = json!({"adaptive": true, "medium": medium, "lights": lights});
+    let glass = json!({"medium": {"sigma_t_per_unit": 2, "index": 1.5}, "lights": [{"type": "sky"}]});
+    scattering::cases(vec![
+        tiny(TECHNIQUE.name, "sphere", 10, 2, &own),
+        tiny(TECHNIQUE.name, "constant", 8, 2, &glass),
+    ])
 }
 
 fn source() -> Source {

@@ -10,6 +10,7 @@ use cloudchamber::film::{ErrorEstimate, Film};
 use cloudchamber::job::Job;
 use cloudchamber::render::Scene;
 use cloudchamber::service::Service;
+use cloudchamber::study::bench::Bench;
 use cloudchamber::volume::Store;
 use serde_json::{Value, json};
 
@@ -27,11 +28,6 @@ pub struct House {
 }
 
 impl House {
-    /// A house on PoCL with so many lanes, or with what the device likes.
-    pub fn new(lanes: Option<u32>) -> Self {
-        Self::on(DeviceConfig { lanes, ..DeviceConfig::pocl() })
-    }
-
     /// A house on a device.
     pub fn on(config: DeviceConfig) -> Self {
         static ONCE: Mutex<()> = Mutex::new(());
@@ -59,7 +55,19 @@ impl House {
     /// The shared one, with the device's own lanes.
     pub fn shared() -> &'static Self {
         static HOUSE: OnceLock<House> = OnceLock::new();
-        HOUSE.get_or_init(|| Self::new(None))
+        HOUSE.get_or_init(|| Self::on(DeviceConfig::pocl()))
+    }
+
+    /// A shared one with so many lanes.
+    pub fn of_lanes(lanes: u32) -> &'static Self {
+        static HOUSES: [OnceLock<House>; 5] = [const { OnceLock::new() }; 5];
+        HOUSES[lanes.ilog2() as usize].get_or_init(|| Self::on(DeviceConfig { lanes: Some(lanes), ..DeviceConfig::pocl() }))
+    }
+
+    /// A study's bench on its service.
+    pub fn bench(&self) -> Bench {
+        let _entered = self.runtime.enter();
+        Bench::of(self.service.clone()).unwrap()
     }
 
     /// What its device says of itself.

@@ -8,6 +8,7 @@ pub mod light;
 pub mod picture;
 pub mod pictures;
 pub mod processes;
+pub mod writers;
 
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};

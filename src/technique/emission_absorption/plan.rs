@@ -16,7 +16,7 @@ use crate::scene::presets;
 use crate::scene::transfer::{TABLE_SIZE, TransferFunction, pack};
 use crate::technique::stepping::{Way, stepping};
 use crate::technique::steps::coarse_step;
-use crate::technique::{CellUse, Open, Settings, View, ViewPlan, view_text};
+use crate::technique::{CellUse, Open, Settings, View, ViewPlan, view_words};
 use crate::volume::{Volume, VoxelType};
 
 /// Words of a lane that a launch leaves to the next: a packet's radiance and transmittance.
@@ -74,9 +74,8 @@ fn permitted(wanted: Features) -> Result<&'static Features> {
 pub(super) fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
-        structs: || {
-            view_text() + &EmissionAbsorption::opencl_text() + &Resume::opencl_text_of_beams("RADIANCE", STATE_WORDS)
-        },
+        words: || view_words() + &Resume::opencl_text_of_beams("RADIANCE", STATE_WORDS),
+        structs: || vec![DeviceView::LAYOUT, EmissionAbsorption::LAYOUT],
         variants: || each_voxel_type(TECHNIQUE.name, &FEATURES),
         common: COMMON * VoxelType::ALL.len(),
     }

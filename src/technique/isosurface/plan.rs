@@ -16,7 +16,7 @@ use crate::scene::interpolation::Interpolation;
 use crate::scene::light::LightRequest;
 use crate::technique::stepping::{Way, stepping};
 use crate::technique::steps::coarse_step;
-use crate::technique::{CellUse, Open, Settings, View, ViewPlan, view_text};
+use crate::technique::{CellUse, Open, Settings, View, ViewPlan, view_words};
 use crate::volume::{Volume, VoxelType};
 
 /// Words of a lane that a launch leaves to the next: a packet's search.
@@ -56,7 +56,8 @@ fn permitted(wanted: Features) -> Result<&'static Features> {
 pub(super) fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
-        structs: || view_text() + &Isosurface::opencl_text() + &Resume::opencl_text_of_beams("SEARCH", STATE_WORDS),
+        words: || view_words() + &Resume::opencl_text_of_beams("SEARCH", STATE_WORDS),
+        structs: || vec![DeviceView::LAYOUT, Isosurface::LAYOUT],
         variants: || each_voxel_type(TECHNIQUE.name, &FEATURES),
         common: VoxelType::ALL.len(),
     }

@@ -17,7 +17,7 @@ use crate::scene::presets::is_hounsfield;
 use crate::scene::window::{Output, Window};
 use crate::technique::stepping::{Way, stepping};
 use crate::technique::steps::coarse_step;
-use crate::technique::{CellUse, Open, Settings, View, ViewPlan, view_text};
+use crate::technique::{CellUse, Open, Settings, View, ViewPlan, view_words};
 use crate::volume::{Volume, VoxelType};
 
 /// Words of a lane that a launch leaves to the next: a packet's best value.
@@ -54,12 +54,10 @@ fn permitted(wanted: Features) -> Result<&'static Features> {
 pub(super) fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
-        structs: || {
-            view_text()
-                + &Projection::opencl_text()
-                + &DeviceMode::opencl_text()
-                + &Resume::opencl_text_of_beams("PROJECTION_BEAM", STATE_WORDS)
+        words: || {
+            view_words() + &DeviceMode::opencl_text() + &Resume::opencl_text_of_beams("PROJECTION_BEAM", STATE_WORDS)
         },
+        structs: || vec![DeviceView::LAYOUT, Projection::LAYOUT],
         variants: || each_voxel_type(TECHNIQUE.name, &FEATURES),
         common: 2 * VoxelType::ALL.len(),
     }

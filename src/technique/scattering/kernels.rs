@@ -4,11 +4,11 @@ use super::device::{Density, Scattering};
 use crate::device::Resume;
 use crate::device::enums::{DeviceEnum, LightKind, PhaseKind};
 use crate::device::program::{Source, Variant, listed};
-use crate::device::structs::DeviceStruct;
+use crate::device::structs::{DeviceStruct, View};
 use crate::error::Result;
 use crate::scene::interpolation::Interpolation;
 use crate::technique::majorant::Tracking;
-use crate::technique::view_text;
+use crate::technique::view_words;
 use crate::volume::VoxelType;
 
 /// Words of a lane that a launch leaves to the next: a sample of `single_scatter`, which has more than a path, and its mask.
@@ -38,14 +38,14 @@ static FEATURES: [Features; 8] = {
 pub(in crate::technique) fn source(kernel: &'static str) -> Source {
     Source {
         kernel,
-        structs: || {
+        words: || {
             "#pragma OPENCL EXTENSION cl_khr_int64_base_atomics : enable\n".to_owned()
-                + &view_text()
-                + &Scattering::opencl_text()
+                + &view_words()
                 + &[Density::opencl_text(), Tracking::opencl_text()].concat()
                 + &[PhaseKind::opencl_text(), LightKind::opencl_text()].concat()
                 + &Resume::opencl_text("SCATTERING", STATE_WORDS)
         },
+        structs: || vec![View::LAYOUT, Scattering::LAYOUT],
         variants: match kernel {
             "single_scatter" => || variants("single_scatter"),
             _ => || variants("volume_path"),

@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::scene::camera::Camera;
 use crate::scene::interpolation::Interpolation;
 use crate::scene::window::{Output, Window};
-use crate::technique::{CellUse, View, ViewPlan, view_text};
+use crate::technique::{CellUse, View, ViewPlan, view_words};
 use crate::volume::{Volume, VoxelType};
 
 type Features = [(&'static str, i32); 1];
@@ -32,7 +32,8 @@ fn permitted(wanted: Features) -> Result<&'static Features> {
 pub(super) fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
-        structs: || view_text() + &Slice::opencl_text(),
+        words: view_words,
+        structs: || vec![DeviceView::LAYOUT, Slice::LAYOUT],
         variants: || each_voxel_type(TECHNIQUE.name, &FEATURES),
         common: VoxelType::ALL.len(),
     }

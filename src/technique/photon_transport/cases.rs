@@ -1,0 +1,54 @@
+//! What tests run of `photon_transport`.
+
+use serde_json::{Value, json};
+
+use super::TECHNIQUE;
+use crate::technique::case::{Case, Cases};
+
+pub(super) fn cases() -> Cases {
+    let light = json!({"mu_a_per_mm": 1, "mu_s_per_mm": 9});
+    let gammas = json!({"phase": {"type": "klein_nishina"}, "attenuation": {"material": "water"}});
+    let mut all: Vec<Case> = Vec::new();
+    for (medium, trackers) in [(light, &["exact", "march", "delta", "weighted"][..]), (gammas, &["exact"])] {
+        for tracking in trackers {
+            all.extend(places(&medium).map(|mut own| {
+                (own["tracking"], own["photons"]) = (json!(tracking), json!(200));
+                own.into()
+            }));
+        }
+    }
+    Cases { all, tiny: tiny() }
+}
+
+/// A medium wherever there may be one.
+fn places(medium: &Value) -> [Value; 4] {
+    let mut layer = medium.clone();
+    layer["thickness_mm"] = json!(0.5);
+    [
+        json!({"medium": medium, "size_mm": [1, 1, 1], "grid": [8, 8, 8]}),
+        json!({"layers": [layer, layer], "grid": [4, 4, 4]}),
+        json!({"labels": {"test": "labels"}, "media": [medium, medium, medium]}),
+        json!({"density": {"test": "labels"}, "medium": medium}),
+    ]
+}
+
+/// The chamber; layers that refract, with a table, a histogram and the gather; delta tracking of a density by track length; gammas.
+fn tiny() -> Vec<Value> {
+    let table = json!({"type": "tabulated", "cosines": [-1, 0, 1], "densities": [1, 0, 2]});
+    let layers = json!([{"thickness_mm": 0.5, "index": 1.2, "phase": table},
+        {"thickness_mm": "infinite", "mu_a_per_mm": 1, "index": 1.5, "phase": {"type": "rayleigh"}}]);
+    let own = [
+        json!({"photons": 70, "grid": [6, 5, 4]}),
+        json!({"photons": 40, "grid": [3, 3, 4], "size_mm": [2, 2, 2], "layers": layers, "boundary": {"fresnel": true},
+            "exit_histogram": {"radius_edges_mm": [0, 1, 5], "angle_edges_deg": [0, 45, 90]}, "tally": "radiance_gather"}),
+        json!({"photons": 30, "density": {"builtin": "gaussian", "resolution": 9}, "tracking": "delta", "estimator": "track_length",
+            "medium": {"mu_a_per_mm": 1, "mu_s_per_mm": 2}, "boundary": {"x": "cyclic", "y": "mirror"}}),
+        json!({"photons": 30, "grid": [3, 2, 4], "size_mm": [50, 50, 50], "source": {"type": "disk"},
+            "medium": {"phase": {"type": "klein_nishina"}, "attenuation": {"material": "water"}}}),
+    ];
+    let request = |own| {
+        json!({"technique": "emission_absorption", "volume": {TECHNIQUE.name: own}, "image": {"width": 5, "height": 4},
+            "budget": {"samples": 1}})
+    };
+    own.map(request).to_vec()
+}

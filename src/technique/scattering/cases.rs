@@ -1,0 +1,13 @@
+//! What tests run of scattering views.
+
+use serde_json::{Value, json};
+
+use crate::technique::case::{Case, Cases, interpolated};
+
+/// All variants, and these tiny requests.
+pub(in crate::technique) fn cases(tiny: Vec<Value>) -> Cases {
+    let trackers = ["march", "delta", "weighted"].map(|tracking| json!({"tracking": tracking}));
+    let mut all = interpolated(&["nearest", "trilinear"], &trackers);
+    all.push(Case { is_even_too: true, own: json!({"tracking": "exact", "interpolation": "nearest"}) });
+    Cases { all, tiny }
+}

@@ -1,0 +1,23 @@
+//! The device: structs lie as on the host, every variant builds without a warning, a tiny case of each kernel runs clean under oclgrind,
+//! and kernels are launched as they are asked for.
+
+pub(crate) mod builds;
+mod cells;
+mod encode;
+mod images;
+mod launches;
+mod names;
+mod oclgrind;
+mod structs;
+
+use std::path::Path;
+
+use cloudchamber::device::{self, Device, DeviceConfig};
+
+fn open(lanes: Option<u32>, kernels: Option<&Path>) -> Device {
+    static ONCE: Mutex<()> = Mutex::new(());
+    let _one_at_a_time = ONCE.lock();
+    device::keep_compiled_kernels_in(&crate::common::kernel_cache()).unwrap();
+    Device::open(&DeviceConfig { lanes, kernels: kernels.map(Path::to_owned), strict: true, ..DeviceConfig::pocl() })
+        .unwrap()
+}

@@ -1,0 +1,23 @@
+//! Techniques, the device and the study in this process: truth first, then distributions, then small pictures.
+//!
+//! One program, so that its tests share one engine ([`common::engine::House::shared`]) and what that has compiled.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test says what is wrong by panicking")]
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod device;
+mod emission_absorption;
+mod isosurface;
+mod levels;
+mod photon_transport;
+mod pictures;
+mod projection;
+mod single_scatter;
+mod slice;
+mod study;
+mod variants;
+mod views;
+mod volume_path;
+mod volumes;

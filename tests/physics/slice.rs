@@ -1,0 +1,5 @@
+//! `slice` against linear fields, slabs in closed form, and what is refused.
+
+mod asked;
+mod planes;
+mod slabs;
