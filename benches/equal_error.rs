@@ -51,8 +51,8 @@ impl Subject {
     }
 
     fn scan(bench: &Bench, path: &Path) -> Self {
-        let id = bench.store().insert(std::fs::read(path).unwrap(), "scan", None).unwrap().1;
-        let volume: std::sync::Arc<Volume> = bench.store().get(&id).unwrap();
+        let id = bench.assets().volumes().insert(std::fs::read(path).unwrap(), "scan", None).unwrap().1;
+        let volume: std::sync::Arc<Volume> = bench.assets().volumes().get(&id).unwrap();
         let Voxels::U8(bytes) = volume.voxels() else { panic!("{}: its voxels are not bytes", path.display()) };
         let name = path.file_name().unwrap().to_string_lossy().split('.').next().unwrap().to_lowercase();
         Self { name, bytes: bytes.clone(), dims: volume.dims(), spacing: volume.spacing() }
@@ -75,7 +75,7 @@ impl Subject {
             spacing: Some(list(self.spacing)),
             endian: None,
         };
-        json!({"id": bench.store().insert(self.bytes.clone(), &self.name, query.parse().unwrap()).unwrap().1})
+        json!({"id": bench.assets().volumes().insert(self.bytes.clone(), &self.name, query.parse().unwrap()).unwrap().1})
     }
 
     /// Parameters of a mode of `scenes`, whose opacities are for the synthetic volume's voxels.

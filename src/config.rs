@@ -6,8 +6,9 @@ use std::time::Duration;
 
 use clap::Args;
 
+use crate::asset::AssetLimits;
 use crate::device::DeviceConfig;
-use crate::volume::{StoreLimits, VolumeLimits};
+use crate::volume::VolumeLimits;
 
 /// Kernels address voxels by 32-bit byte offsets.
 const LARGEST_VOLUME: u64 = (1 << 31) - 16;
@@ -120,9 +121,9 @@ impl Limits {
         VolumeLimits { max_volume_bytes: self.max_volume_bytes, max_side: 4096 }
     }
 
-    /// The limits that the store of volumes keeps.
-    pub fn store(&self) -> StoreLimits {
-        StoreLimits {
+    /// The limits that stored things keep.
+    pub fn assets(&self) -> AssetLimits {
+        AssetLimits {
             volume: self.volume(),
             max_store_bytes: self.max_store_bytes,
             max_resident_bytes: self.max_resident_bytes,

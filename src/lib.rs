@@ -6,7 +6,7 @@
 //! ```
 //!
 //! The data goes one way, and modules use each other the other way: `command` → `http` → `study` → `service` → `plan` and `run` → `job` →
-//! `render` → `technique` → `scene` → `request` → `config` → `device` → `film` → `frame` → `volume` → `error`, never back and never in a circle
+//! `render` → `technique` → `scene` → `request` → `config` → `device` → `film` → `frame` → `asset` → `volume` → `error`, never back and never in a circle
 //! (`tests/house.rs`). `docs/architecture.md` walks one request and one field through the files.
 //!
 //! | module | what it is |
@@ -27,13 +27,15 @@
 //! | [`device`] | the only home of OpenCL and of `unsafe`: context, programs, buffers, bounded launches |
 //! | [`film`] | sums on the host: picture and error |
 //! | [`frame`] | picture to PNG or EXR, with its metadata |
-//! | [`volume`] | grids: readers, built-ins, the store |
+//! | [`asset`] | what is stored, by the hash of its content: volumes |
+//! | [`volume`] | grids: readers, built-ins |
 //! | [`power_law`] | lines on logarithmic axes |
 //! | [`error`] | one error enum; the one place where a status code is chosen |
 //!
 //! Kernels: `kernels/<technique>.cl` and `kernels/shared/`. The viewer: `static/`. Tests: `tests/<technique>.rs` and
 //! `tests/{api,stream,faults,viewer,…}.rs`.
 
+pub mod asset;
 pub mod chart;
 pub mod command;
 pub mod config;

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
+use crate::asset::Assets;
 use crate::config::Limits;
 use crate::device::DeviceConfig;
 use crate::error::{Error, Result};
@@ -13,7 +14,6 @@ use crate::job::{CancelOnDrop, Engine, Job, Place, State};
 use crate::plan::{Calibrations, Planner};
 use crate::render::Scene;
 use crate::run::DeviceExecutor;
-use crate::volume::Store;
 
 /// A handle on the service; clones share it.
 #[derive(Clone)]
@@ -23,7 +23,7 @@ pub struct Service {
 
 struct Shared {
     engine: Engine,
-    store: Store,
+    assets: Assets,
     limits: Limits,
     calibrations: Calibrations,
 }
@@ -37,15 +37,15 @@ pub struct Prepared {
 }
 
 impl Service {
-    /// Opens the store in `data_dir` and starts the engine. Must be called within a tokio runtime.
+    /// Opens what is stored in `data_dir` and starts the engine. Must be called within a tokio runtime.
     ///
     /// # Errors
     /// [`Error::Internal`] when the folder cannot be used or no thread can be started.
     pub fn start(device: DeviceConfig, data_dir: &Path, limits: Limits) -> Result<Self> {
-        let store = Store::open(&data_dir.join("volumes"), limits.store())?;
+        let assets = Assets::open(data_dir, limits.assets())?;
         let engine = Engine::new(DeviceExecutor::start(device, &limits)?, limits.clone());
         let calibrations = Calibrations::kept_in(data_dir);
-        Ok(Self { shared: Arc::new(Shared { engine, store, limits, calibrations }) })
+        Ok(Self { shared: Arc::new(Shared { engine, assets, limits, calibrations }) })
     }
 
     /// The engine.
@@ -53,9 +53,9 @@ impl Service {
         &self.shared.engine
     }
 
-    /// The stored volumes.
-    pub fn store(&self) -> &Store {
-        &self.shared.store
+    /// What is stored.
+    pub fn assets(&self) -> &Assets {
+        &self.shared.assets
     }
 
     /// The limits.
@@ -65,8 +65,8 @@ impl Service {
 
     /// The planner.
     pub fn planner(&self) -> Planner<'_> {
-        let Shared { engine, store, limits, calibrations } = &*self.shared;
-        Planner { engine, store, limits, calibrations }
+        let Shared { engine, assets, limits, calibrations } = &*self.shared;
+        Planner { engine, assets, limits, calibrations }
     }
 
     /// The scene of a request whose technique is a view's. It loads the volume, so it may block for a while.
@@ -74,7 +74,7 @@ impl Service {
     /// # Errors
     /// [`Error::Invalid`] with JSON pointers and permitted ranges.
     pub fn scene(&self, request: &Value) -> Result<Scene> {
-        Scene::from_json(request, self.store(), self.limits())
+        Scene::from_json(request, self.assets(), self.limits())
     }
 
     /// Plans a request where its technique is `auto`, takes a place in the queue, checks the request and loads its volume.

@@ -97,7 +97,7 @@ async fn render_here(args: &Arguments, scene: &mut Value) -> Result<(Vec<u8>, Va
     if let Some(path) = &args.volume {
         let bytes = std::fs::read(path).map_err(|e| Error::Malformed(format!("{}: {e}", path.display())))?;
         let name = path.file_name().map_or_else(|| "volume".into(), |n| n.to_string_lossy().into_owned());
-        scene["volume"] = json!({"id": service.store().insert(bytes, &name, None)?.1});
+        scene["volume"] = json!({"id": service.assets().volumes().insert(bytes, &name, None)?.1});
     }
     service.engine().ready().await?;
     let job = service.submit(scene.take()).await?;

@@ -86,8 +86,8 @@ fn variant(whole: bool) -> Variant {
 pub fn source() -> Source {
     Source {
         kernel: "encode",
-        words: String::new,
-        structs: || vec![Encode::LAYOUT, FilmSum::LAYOUT, ControlSum::LAYOUT],
+        words: || FilmSum::opencl_text() + &ControlSum::opencl_text(),
+        structs: || vec![Encode::LAYOUT],
         variants: || [true, false].map(variant).to_vec(),
         common: 2,
     }

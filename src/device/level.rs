@@ -46,7 +46,8 @@ impl Level {
 /// [`Error::Internal`] when the smallest of kernels does not build or run: then none does.
 pub(super) fn of(device: &mut Device) -> Result<&'static str> {
     let variant = Variant::new("level", None, &[]);
-    let source = Source { kernel: "level", words: String::new, structs: || vec![Level::LAYOUT], variants: Vec::new, common: 0 };
+    let source =
+        Source { kernel: "level", words: Level::opencl_text, structs: Vec::new, variants: Vec::new, common: 0 };
     device.build(&source, &variant)?;
     let mut number = [0i32];
     let out = device.upload(bytemuck::cast_slice(&number), 0)?;

@@ -83,7 +83,7 @@ pub(super) async fn metrics(State(app): State<App>) -> Response {
     metrics::gauge!("cloudchamber_renders_unfinished").set(app.service.engine().unfinished() as f64);
     metrics::gauge!("cloudchamber_streams_open")
         .set((app.service.limits().max_streams - app.streams.available_permits()) as f64);
-    let (stored, resident) = app.service.store().sizes();
+    let (stored, resident) = app.service.assets().sizes();
     metrics::gauge!("cloudchamber_volumes_stored_bytes").set(stored as f64);
     metrics::gauge!("cloudchamber_volumes_resident_bytes").set(resident as f64);
     if let Some(bytes) = resident_bytes() {

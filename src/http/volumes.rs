@@ -31,7 +31,7 @@ pub(super) async fn create(State(app): State<App>, request: Request<Body>) -> Re
     let bytes =
         problem::read_body(&parts.headers, body, app.service.limits().max_body_bytes, app.request_timeout).await?;
     let service = app.service.clone();
-    let (volume, id, new) = tokio::task::spawn_blocking(move || service.store().insert(bytes, &name, raw))
+    let (volume, id, new) = tokio::task::spawn_blocking(move || service.assets().volumes().insert(bytes, &name, raw))
         .await
         .map_err(Error::internal)??;
     let location = format!("/v1/volumes/{id}");
@@ -53,7 +53,8 @@ fn refuse_forms(headers: &axum::http::HeaderMap) -> Result<()> {
 
 /// `GET /v1/volumes`.
 pub(super) async fn list(State(app): State<App>) -> Result<Json<Value>> {
-    let volumes = tokio::task::spawn_blocking(move || app.service.store().list()).await.map_err(Error::internal)?;
+    let volumes =
+        tokio::task::spawn_blocking(move || app.service.assets().list_volumes()).await.map_err(Error::internal)?;
     Ok(Json(json!({"volumes": volumes})))
 }
 
@@ -61,9 +62,9 @@ pub(super) async fn list(State(app): State<App>) -> Result<Json<Value>> {
 pub(super) async fn show(State(app): State<App>, Id(id): Id) -> Result<Json<VolumeInfo>> {
     let info = tokio::task::spawn_blocking(move || {
         if builtin::NAMES.contains(&id.as_str()) {
-            app.service.store().builtin_info(&id, SHOWN_RESOLUTION, 0)
+            app.service.assets().builtin_info(&id, SHOWN_RESOLUTION, 0)
         } else {
-            app.service.store().info(&id)
+            app.service.assets().volumes().info(&id)
         }
     });
     Ok(Json(info.await.map_err(Error::internal)??))
@@ -74,6 +75,8 @@ pub(super) async fn delete(State(app): State<App>, Id(id): Id) -> Result<StatusC
     if builtin::NAMES.contains(&id.as_str()) {
         return Err(Error::Conflict("a built-in volume cannot be deleted".into()));
     }
-    tokio::task::spawn_blocking(move || app.service.store().delete(&id)).await.map_err(Error::internal)??;
+    tokio::task::spawn_blocking(move || app.service.assets().volumes().delete(&id))
+        .await
+        .map_err(Error::internal)??;
     Ok(StatusCode::NO_CONTENT)
 }

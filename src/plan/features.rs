@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::render::Scene;
-use crate::volume::Volume;
+use crate::technique::PreparedView;
 
 /// The features of a scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -31,21 +31,23 @@ pub struct Features {
 }
 
 impl Features {
-    /// Those of a scene.
-    pub fn of(scene: &Scene, volume: &Volume) -> Self {
-        let optics = scene.view().optics(volume);
-        let voxel = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
-        let width = volume.range()[1] - volume.range()[0];
+    /// Those of a scene, with its view as that is prepared.
+    pub fn of(scene: &Scene, view: &dyn PreparedView) -> Self {
+        let optics = view.optics();
+        let volume = scene.subject().volume();
+        let voxel = volume.map_or(scene.subject().bounds().smallest_side(), |v| v.smallest_side());
+        let width = volume.map_or(0.0, |v| v.range()[1] - v.range()[0]);
+        let pixel = scene.camera().height_at_target() / f64::from(scene.image()[1]);
         Self {
-            homogeneous: volume.non_finite() == 0 && volume.range()[0] == volume.range()[1],
+            homogeneous: volume.is_some_and(|v| v.non_finite() == 0 && v.range()[0] == v.range()[1]),
             optical_depth: optics.as_ref().map(|o| o.optical_depth),
             albedo: optics.as_ref().map(|o| o.albedo),
             anisotropy: optics.as_ref().and_then(|o| o.anisotropy),
-            steepest_slope: scene.view().steepest_slope(volume).map(|slope| slope * width * voxel),
+            steepest_slope: view.steepest_slope().map(|slope| slope * width * voxel),
             opaque: None,
             multiple_scattering: optics.as_ref().map(|o| o.missing(1)),
             light_shares: optics.map_or(Vec::new(), |o| o.light_shares),
-            pixels_per_voxel: pixels_per_voxel(scene, volume),
+            pixels_per_voxel: if pixel > 0.0 { voxel / pixel } else { f64::INFINITY },
         }
     }
 
@@ -79,10 +81,4 @@ impl Features {
         }
         words
     }
-}
-
-fn pixels_per_voxel(scene: &Scene, volume: &Volume) -> f64 {
-    let voxel = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
-    let pixel = scene.camera().height_at_target() / f64::from(scene.image()[1]);
-    if pixel > 0.0 { voxel / pixel } else { f64::INFINITY }
 }

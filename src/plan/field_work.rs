@@ -11,16 +11,17 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use super::Planner;
 use super::found::Found;
 use super::noise::in_common;
 use super::pilot::{PIXELS, SAMPLES};
 use super::reply::FieldAmount;
 use super::run::{Asked, Run, mean, to_its_end};
+use super::{Planner, looking_at};
 use crate::error::{Error, Result};
 use crate::film::Round;
+use crate::render::Scene;
 use crate::render::region::Region;
-use crate::render::{AskedWork, Scene, Subject};
+use crate::technique::AskedField;
 use crate::volume::Volume;
 
 /// How long the second field is to take, ms.
@@ -35,7 +36,7 @@ const MOST_FREEDOM: f64 = 1e4;
 
 /// A field as pilots see it.
 pub struct Simulated {
-    asked: AskedWork,
+    asked: AskedField,
     most: u64,
     /// The work of the small ones.
     few: u64,
@@ -69,8 +70,7 @@ impl Simulated {
     ///
     /// # Errors
     /// Those of the renders.
-    pub async fn of(planner: &Planner<'_>, scene: &Scene) -> Result<Self> {
-        let Subject::Field(_, asked) = *scene.subject() else { return Err(Error::internal("there is no field")) };
+    pub async fn of(planner: &Planner<'_>, scene: &Scene, asked: AskedField) -> Result<Self> {
         let most = (asked.work.most)(planner.limits);
         let first = asked.work.first.min(most);
         let (_, ms) = simulate(planner, scene, [first, 1]).await?;
@@ -105,7 +105,7 @@ impl Simulated {
         for seed in 3..3 + FIELDS as u64 {
             // One at a time: they may be large.
             let (field, took) = simulate(asked.planner, scene, [self.few, seed]).await?;
-            let looking = Asked { scene: &scene.looking_at(Subject::Volume(field)), ..asked };
+            let looking = Asked { scene: &looking_at(scene, &field)?, ..asked };
             let [c, d] = last(&looking.run_two(&pilot.setting, region, SAMPLES).await?)?;
             let products: Vec<f64> = in_common([&c, &a], [&d, &b]).collect();
             of_fields.push(mean(products.iter().copied()));
@@ -149,9 +149,10 @@ fn last([a, b]: &[Run; 2]) -> Result<[Arc<Round>; 2]> {
 
 /// The field of a scene after so much work, by a seed of its own, and its time on the device, ms.
 async fn simulate(planner: &Planner<'_>, scene: &Scene, [work, seed]: [u64; 2]) -> Result<(Arc<Volume>, f64)> {
-    let Subject::Field(field, asked) = scene.subject() else { return Err(Error::internal("there is no field")) };
+    let Some(asked) = scene.subject().field() else { return Err(Error::internal("there is no field")) };
     let region = Region::some(1.0, [0, 0], scene.image());
-    let pilot = scene.looking_at(Subject::Field(field.with(work, seed), *asked)).into_pilot(region, 1);
+    let other = scene.subject().with_field(asked.field.with(work, seed));
+    let pilot = scene.looking_at(other)?.into_pilot(region, 1);
     let job = to_its_end(planner, pilot).await?;
     let field = job.field().ok_or_else(|| Error::internal("a pilot without its field"))?;
     Ok((field, job.field_ms().max(f64::MIN_POSITIVE)))

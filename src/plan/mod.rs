@@ -21,14 +21,17 @@ mod run;
 mod target;
 mod words;
 
+use std::sync::Arc;
+
 use serde_json::{Value, json};
 
+use crate::asset::Assets;
 use crate::config::Limits;
 use crate::error::{Error, Result};
 use crate::job::Engine;
-use crate::render::{AUTO, Scene, Subject};
-use crate::technique::{self, Open, Setting, Settings, Technique};
-use crate::volume::{MOST_LEVEL, Store, Volume};
+use crate::render::{AUTO, Scene};
+use crate::technique::{self, Open, PreparedView, Setting, Settings, Technique};
+use crate::volume::{MOST_LEVEL, Volume};
 pub use calibration::Calibrations;
 use choose::{Choice, Chosen};
 use features::Features;
@@ -52,6 +55,7 @@ struct Seen {
     asked: Scene,
     /// The same, looking at a volume that is there.
     scene: Scene,
+    view: Arc<dyn PreparedView>,
     simulated: Option<Simulated>,
     features: Features,
     open: bool,
@@ -61,8 +65,8 @@ struct Seen {
 pub struct Planner<'a> {
     /// Runs the pilots.
     pub engine: &'a Engine,
-    /// Has the volumes.
-    pub store: &'a Store,
+    /// What is stored.
+    pub assets: &'a Assets,
     /// What is permitted.
     pub limits: &'a Limits,
     /// What is known of this device.
@@ -155,16 +159,17 @@ impl Planner<'_> {
             with_technique[technique.name] = Value::Object(reply::options(body, &setting));
         }
         let asked = self.scene(&with_technique)?;
-        let simulated = match asked.subject() {
-            Subject::Volume(_) => None,
-            Subject::Field(..) => Some(Simulated::of(self, &asked).await?),
+        let simulated = match asked.subject().field() {
+            None => None,
+            Some(field) => Some(Simulated::of(self, &asked, field.clone()).await?),
         };
         let scene = match &simulated {
-            Some(simulated) => asked.looking_at(Subject::Volume(simulated.volume().clone())),
+            Some(simulated) => looking_at(&asked, simulated.volume())?,
             None => asked.clone(),
         };
-        let features = Features::of(&scene, volume_of(&scene)?);
-        Ok(Seen { asked, scene, simulated, features, open: body["technique"] == AUTO })
+        let view = scene.prepared(None)?;
+        let features = Features::of(&scene, &*view);
+        Ok(Seen { asked, scene, view, simulated, features, open: body["technique"] == AUTO })
     }
 
     /// Measures what is to be known of this device, unless that is known.
@@ -203,7 +208,7 @@ impl Planner<'_> {
 
     fn scene(&self, request: &Value) -> Result<Scene> {
         // A volume may have to be decoded first: the runtime's other work goes on meanwhile.
-        tokio::task::block_in_place(|| Scene::from_json(request, self.store, self.limits))
+        tokio::task::block_in_place(|| Scene::from_json(request, self.assets, self.limits))
     }
 }
 
@@ -213,9 +218,8 @@ impl Seen {
         let name = self.scene.technique().name;
         let as_given =
             || Settings { all: vec![Setting::as_given(name, format!("{name} as it is given"))], ruled_out: Vec::new() };
-        let Ok(volume) = volume_of(&self.scene) else { return as_given() };
         let open = Open { given: self.scene.given(), auto: self.open, levels: self.levels(), error };
-        let mut settings = self.scene.view().settings(volume, &open).unwrap_or_else(as_given);
+        let mut settings = self.view.settings(&open).unwrap_or_else(as_given);
         tokio::task::block_in_place(|| settings.all.retain(|setting| self.scene.with_setting(setting).is_ok()));
         settings
     }
@@ -228,12 +232,9 @@ impl Seen {
     }
 }
 
-/// The volume that a scene looks at.
-fn volume_of(scene: &Scene) -> Result<&Volume> {
-    match scene.subject() {
-        Subject::Volume(volume) => Ok(volume),
-        Subject::Field(..) => Err(Error::internal("a field that was not simulated")),
-    }
+/// The scene with this in place of its field. It may take a while.
+fn looking_at(scene: &Scene, volume: &Arc<Volume>) -> Result<Scene> {
+    tokio::task::block_in_place(|| scene.looking_at(scene.subject().with_volume(volume.clone())))
 }
 
 /// The technique that a request is planned as. Where it names none, that is the complete technique of what it says of the scene, or the first

@@ -10,18 +10,18 @@ use std::sync::Arc;
 
 use serde_json::{Map, Value};
 
+use crate::asset::Assets;
 use crate::config::Limits;
 use crate::error::{Error, Result};
 use crate::film::picture::Background;
 use crate::request::{self, BudgetRequest, CameraRequest, ImageRequest, RenderRequest};
-use crate::scene::camera::{Camera, Framing};
+use crate::scene::camera::Camera;
 use crate::scene::clip::Clip;
-use crate::technique::{self, Kind, Setting, Technique, View};
-use crate::volume::{Store, Volume};
+use crate::technique::{self, Kind, PreparedView, Setting, Subject, Technique, View};
+use crate::volume::Volume;
 use region::Region;
 pub use schema::{parameters_schema, schema};
 use shared::{own_parameters, where_it_was_given};
-pub use subject::{AskedWork, Subject};
 
 /// The technique of a request that leaves it to the planner.
 pub const AUTO: &str = "auto";
@@ -51,7 +51,8 @@ pub struct Scene {
     level: Option<u32>,
     asked_samples: Option<u32>,
     subject: Subject,
-    framing: Framing,
+    /// The view of its subject, once that is there: of a field it is not.
+    prepared: Option<Arc<dyn PreparedView>>,
     camera: Camera,
     clip: Clip,
     image: [u32; 2],
@@ -66,7 +67,7 @@ impl Scene {
     ///
     /// # Errors
     /// [`Error::Invalid`] with JSON pointers and permitted ranges.
-    pub fn from_json(body: &Value, store: &Store, limits: &Limits) -> Result<Self> {
+    pub fn from_json(body: &Value, assets: &Assets, limits: &Limits) -> Result<Self> {
         if !body.is_object() {
             return Err(Error::invalid("", "not an object", "a JSON object with at least technique"));
         }
@@ -85,13 +86,13 @@ impl Scene {
             ));
         };
         let own = own_parameters(technique, &request)?;
-        let view =
-            parse(&own, &format!("/{}", technique.name)).map_err(|e| where_it_was_given(e, technique, &request))?;
-        let (subject, framing) = subject::of_request(request.volume.as_ref(), store, limits)?;
+        let view = parse(&own, &format!("/{}", technique.name), assets)
+            .map_err(|e| where_it_was_given(e, technique, &request))?;
+        let subject = subject::of_request(request.volume.as_ref(), view.bounds(), assets, limits)?;
         if view.shows_labels() && request.volume.as_ref().is_some_and(|v| v.level.is_some_and(|l| l > 0)) {
             return Err(Error::invalid("/volume/level", "there is no mean of labels", "0, or leave it out"));
         }
-        let camera = Camera::from_request(request.camera.as_ref(), &framing)?;
+        let camera = Camera::from_request(request.camera.as_ref(), subject.bounds())?;
         let clip = Clip::from_request(request.clip.as_ref())?;
         if request.clip.is_some() && !view.clips() {
             let detail = format!("{} shows the whole volume: light comes from everywhere", technique.name);
@@ -110,7 +111,7 @@ impl Scene {
             level: request.volume.as_ref().and_then(|v| v.level),
             asked_samples,
             subject,
-            framing,
+            prepared: None,
             camera,
             clip,
             image,
@@ -119,17 +120,16 @@ impl Scene {
             seed: request.seed.unwrap_or(0),
             pilot: None,
         };
-        scene.checked()
+        scene.prepared_for_subject()
     }
 
-    /// The scene, once its view and its volume are found to go together.
-    fn checked(self) -> Result<Self> {
-        if let Subject::Volume(volume) = &self.subject {
-            self.view.plan(volume)?;
-            // Made here, so that the device thread finds them there.
-            self.words_of(volume)?;
-        }
-        Ok(self)
+    /// The scene, once its view and its subject are found to go together. Of a field that is not known before it is there.
+    fn prepared_for_subject(self) -> Result<Self> {
+        let prepared = match self.subject.field() {
+            None => Some(self.view.prepare(&self.subject)?),
+            Some(_) => None,
+        };
+        Ok(Self { prepared, ..self })
     }
 
     /// The same picture by another of its settings.
@@ -138,16 +138,19 @@ impl Scene {
     /// [`Error::Invalid`] where the setting and the scene do not go together.
     pub(crate) fn with_setting(&self, setting: &Setting) -> Result<Self> {
         let mut scene = self.clone();
+        if setting.view.is_none() && setting.level.is_none() {
+            return Ok(scene);
+        }
         if let Some(view) = &setting.view {
             scene.technique = technique::find(setting.technique)
                 .ok_or_else(|| Error::internal("a setting of a technique that is not in the list"))?;
             scene.view = view.clone();
             scene.own = format!("{} {}: {}", setting.technique, self.own, setting.words).into();
         }
-        if let (Subject::Volume(volume), Some(level)) = (&self.subject, setting.level) {
-            scene.subject = Subject::Volume(volume.level(level));
+        if let (Some(volume), Some(level)) = (self.subject.volume(), setting.level) {
+            scene.subject = self.subject.with_volume(volume.level(level));
         }
-        scene.checked()
+        scene.prepared_for_subject()
     }
 
     /// The same scene from another camera, given as the body of `PUT …/camera`.
@@ -156,7 +159,7 @@ impl Scene {
     /// [`Error::Invalid`] naming the field under `/camera`.
     pub fn camera_from_json(&self, body: &Value) -> Result<Camera> {
         let request: CameraRequest = request::parse(body, request::schema_of::<CameraRequest>(), "/camera")?;
-        Camera::from_request(Some(&request), &self.framing)
+        Camera::from_request(Some(&request), self.subject.bounds())
     }
 
     /// Puts another camera in.
@@ -175,8 +178,23 @@ impl Scene {
     }
 
     /// The same with another subject.
-    pub(crate) fn looking_at(&self, subject: Subject) -> Self {
-        Self { subject, ..self.clone() }
+    ///
+    /// # Errors
+    /// As [`View::prepare`].
+    pub(crate) fn looking_at(&self, subject: Subject) -> Result<Self> {
+        Self { subject, ..self.clone() }.prepared_for_subject()
+    }
+
+    /// The view of its subject, or of what its field has become.
+    ///
+    /// # Errors
+    /// As [`View::prepare`].
+    pub(crate) fn prepared(&self, field: Option<&Arc<Volume>>) -> Result<Arc<dyn PreparedView>> {
+        match (field, &self.prepared) {
+            (None, Some(prepared)) => Ok(prepared.clone()),
+            (Some(volume), _) => self.view.prepare(&self.subject.with_volume(volume.clone())),
+            (None, None) => Err(Error::internal("a field that was not computed")),
+        }
     }
 
     /// The samples of the budget, where the request gives them.
@@ -215,13 +233,6 @@ impl Scene {
     /// The technique and its own parameters as the request has them: what belongs to those alone can be kept by it.
     pub(crate) fn own(&self) -> &Arc<str> {
         &self.own
-    }
-    /// The words that the view takes a volume's floats as, where it does.
-    ///
-    /// # Errors
-    /// As [`View::plan`].
-    pub(crate) fn words_of(&self, volume: &Volume) -> Result<Option<Arc<Volume>>> {
-        Ok(self.view.resolution(volume)?.and_then(|resolution| volume.words(resolution)))
     }
     /// What is looked at.
     pub fn subject(&self) -> &Subject {

@@ -4,43 +4,30 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
+use crate::asset::Assets;
 use crate::config::Limits;
 use crate::error::{Error, Result};
 use crate::request::VolumeRequest;
-use crate::scene::camera::Framing;
-use crate::technique::{self, Field, Kind, Technique, Work};
-use crate::volume::{Store, Volume, builtin};
+use crate::scene::bounds::Bounds;
+use crate::technique::{self, AskedField, Kind, Subject, Technique, Work};
+use crate::volume::{Volume, builtin};
 
-/// What is looked at.
-#[derive(Clone)]
-pub enum Subject {
-    /// A volume that is there.
-    Volume(Arc<Volume>),
-    /// A volume that is computed first, and how much work is asked for.
-    Field(Arc<dyn Field>, AskedWork),
-}
-
-/// How much of a field is asked for.
-#[derive(Clone, Copy)]
-pub struct AskedWork {
-    /// The technique's name.
-    pub technique: &'static str,
-    /// The parameter that says how much.
-    pub work: Work,
-    /// How much the request says, where it says so.
-    pub given: Option<u64>,
-}
-
-/// What a request looks at, with the framing of it; loads the volume that it names.
+/// What a request looks at; loads the volume that it names. `own` is the box of what the view shows by itself: then no volume is needed.
 ///
 /// # Errors
 /// [`Error::Invalid`] with a pointer under `/volume`.
 pub(super) fn of_request(
     request: Option<&VolumeRequest>,
-    store: &Store,
+    own: Option<Bounds>,
+    assets: &Assets,
     limits: &Limits,
-) -> Result<(Subject, Framing)> {
-    let Some(request) = request else { return Ok(at_level(&built_in("smoke", None, None, store)?, 0)) };
+) -> Result<Subject> {
+    let Some(request) = request else {
+        return match own {
+            Some(bounds) => Ok(Subject::of_bounds(bounds)),
+            None => Ok(at_level(&built_in("smoke", None, None, assets)?, 0)),
+        };
+    };
     let given = usize::from(request.id.is_some()) + usize::from(request.builtin.is_some()) + request.field.len();
     if given != 1 {
         let permitted = "exactly one of id, builtin, or a field technique";
@@ -62,20 +49,19 @@ pub(super) fn of_request(
     }
     let level = request.level.unwrap_or(0) as usize;
     if let Some(id) = &request.id {
-        return Ok(at_level(&store.named(id, "/volume/id")?, level));
+        return Ok(at_level(&assets.volumes().named(id, "/volume/id")?, level));
     }
     if let Some(name) = &request.builtin {
-        return Ok(at_level(&built_in(name, request.resolution, request.seed, store)?, level));
+        return Ok(at_level(&built_in(name, request.resolution, request.seed, assets)?, level));
     }
     let (name, parameters) = request.field.iter().next().ok_or_else(|| Error::internal("a field without a name"))?;
     let technique = technique::find(name);
     let Some((technique, Kind::Field { parse, work })) = technique.map(|t| (t, t.kind)) else {
         return Err(Error::internal("the schema permits a field that is not in the list"));
     };
-    let field = parse(&within_limits(technique, work, parameters, limits), &format!("/volume/{name}"), store)?;
-    let framing = field.framing();
+    let field = parse(&within_limits(technique, work, parameters, limits), &format!("/volume/{name}"), assets)?;
     let given = parameters.get(work.of).and_then(Value::as_u64);
-    Ok((Subject::Field(field, AskedWork { technique: technique.name, work, given }), framing))
+    Ok(Subject::of_field(AskedField { field, technique: technique.name, work, given }))
 }
 
 /// The parameters with a default amount of work that the limits permit.
@@ -88,14 +74,14 @@ fn within_limits(technique: &Technique, work: Work, parameters: &Value, limits: 
     parameters
 }
 
-fn at_level(volume: &Arc<Volume>, level: usize) -> (Subject, Framing) {
-    (Subject::Volume(volume.level(level)), Framing::from(&**volume))
+fn at_level(volume: &Arc<Volume>, level: usize) -> Subject {
+    Subject::of_volume(volume.clone()).with_volume(volume.level(level))
 }
 
-fn built_in(name: &str, resolution: Option<u32>, seed: Option<u64>, store: &Store) -> Result<Arc<Volume>> {
+fn built_in(name: &str, resolution: Option<u32>, seed: Option<u64>, assets: &Assets) -> Result<Arc<Volume>> {
     if !builtin::NAMES.contains(&name) {
         let permitted = builtin::NAMES.join(", ");
         return Err(Error::invalid("/volume/builtin", format!("there is no built-in volume '{name}'"), permitted));
     }
-    store.builtin(name, resolution.unwrap_or(128) as usize, seed.unwrap_or(0))
+    assets.builtin(name, resolution.unwrap_or(128) as usize, seed.unwrap_or(0))
 }

@@ -10,8 +10,8 @@ use super::view_run::ViewRun;
 use crate::device::cells;
 use crate::device::program::Variant;
 use crate::error::Result;
-use crate::render::{Scene, Subject};
-use crate::technique::ViewPlan;
+use crate::render::Scene;
+use crate::technique::{AskedField, PreparedView};
 use crate::volume::Volume;
 
 impl Live {
@@ -40,18 +40,18 @@ impl Live {
 
     /// Points the view at the newest camera, or begins it.
     fn aim(&mut self, context: &mut DeviceContext, scene: &Scene, complete: Option<Arc<Volume>>) -> Result<()> {
-        match (scene.subject(), &mut self.view, complete) {
-            (_, Some(view), _) => {
-                // A field that is still filling is looked at from the new camera at once.
-                let fills = self.field.as_ref().is_some_and(|f| !f.is_over());
-                self.stage = if fills { Stage::Looks } else { Stage::Refines };
-                self.job.started();
-                view.restart(context, scene)
-            }
+        if let Some(view) = &mut self.view {
+            // A field that is still filling is looked at from the new camera at once.
+            let fills = self.field.as_ref().is_some_and(|f| !f.is_over());
+            self.stage = if fills { Stage::Looks } else { Stage::Refines };
+            self.job.started();
+            return view.restart(context, scene);
+        }
+        match (scene.subject().field(), complete) {
             // A field that was computed for an earlier camera is looked at again, not computed again.
-            (Subject::Field(..), None, Some(volume)) => self.begin_view(context, volume),
-            (Subject::Volume(volume), None, _) => self.begin_view(context, volume.clone()),
-            (Subject::Field(..), None, None) => self.begin_field(context),
+            (Some(_), Some(volume)) => self.begin_view(context, Some(&volume)),
+            (Some(_), None) => self.begin_field(context),
+            (None, _) => self.begin_view(context, None),
         }
     }
 
@@ -71,9 +71,8 @@ impl Live {
     }
 
     pub(super) fn begin_field(&mut self, context: &mut DeviceContext) -> Result<()> {
-        let Some(Subject::Field(field, _)) = self.camera.as_ref().map(|c| c.scene.subject().clone()) else {
-            return Ok(());
-        };
+        let asked = self.camera.as_ref().and_then(|camera| camera.scene.subject().field().cloned());
+        let Some(AskedField { field, .. }) = asked else { return Ok(()) };
         if !self.is_ready(context, &field.kernels()?)? {
             self.stage = Stage::AwaitsField;
             return Ok(());
@@ -87,22 +86,18 @@ impl Live {
         Ok(())
     }
 
-    pub(super) fn begin_view(&mut self, context: &mut DeviceContext, volume: Arc<Volume>) -> Result<()> {
+    /// Begins the view of the subject, or of what its field has become.
+    pub(super) fn begin_view(&mut self, context: &mut DeviceContext, field: Option<&Arc<Volume>>) -> Result<()> {
         let Some(camera) = &self.camera else { return Ok(()) };
-        let scene = &camera.scene;
-        let words = scene.words_of(&volume)?;
-        let mut plan = scene.view().plan(words.as_ref().unwrap_or(&volume))?;
-        if words.is_some() {
-            let half = 0.5 * volume.word_step();
-            plan.reasons.push(format!("floats are taken as words of 16 bits: values are off by {half:.1e} at most"));
-        }
-        self.run_view(context, words.unwrap_or(volume), plan)
+        let prepared = camera.scene.prepared(field)?;
+        self.run_view(context, prepared)
     }
 
-    pub(super) fn run_view(&mut self, context: &mut DeviceContext, volume: Arc<Volume>, plan: ViewPlan) -> Result<()> {
-        let [of_cells, of_distances] = cells::needed(volume.voxel_type());
-        if !self.is_ready(context, &[plan.variant, of_cells, of_distances])? {
-            self.stage = Stage::AwaitsView(volume, plan);
+    pub(super) fn run_view(&mut self, context: &mut DeviceContext, prepared: Arc<dyn PreparedView>) -> Result<()> {
+        let mut kernels = vec![prepared.plan().variant];
+        kernels.extend(prepared.volume().into_iter().flat_map(|volume| cells::needed(volume.voxel_type())));
+        if !self.is_ready(context, &kernels)? {
+            self.stage = Stage::AwaitsView(prepared);
             return Ok(());
         }
         let Some(camera) = &self.camera else { return Ok(()) };
@@ -115,8 +110,9 @@ impl Live {
                 earlier.gathered
             })
         });
-        let view = ViewRun::new(context, camera.scene.clone(), volume.clone(), plan, before)?;
-        self.note(&view, &volume);
+        let non_finite = prepared.volume().map_or(0, |volume| volume.non_finite());
+        let view = ViewRun::new(context, camera.scene.clone(), prepared, before)?;
+        self.note(&view, non_finite);
         self.view = Some(view);
         let fills = self.field.as_ref().is_some_and(|f| !f.is_over());
         self.stage = if fills { Stage::Looks } else { Stage::Refines };
@@ -124,7 +120,7 @@ impl Live {
     }
 
     /// Puts the reasons and the warnings into the job's record.
-    fn note(&self, view: &ViewRun, volume: &Volume) {
+    fn note(&self, view: &ViewRun, non_finite_voxels: u64) {
         let field = self.field.as_ref();
         let mut reasons = field.map_or(Vec::new(), |f| f.reasons().to_vec());
         reasons.extend_from_slice(&view.plan().reasons);
@@ -132,6 +128,6 @@ impl Live {
         let simulated = field.and_then(|f| f.result.as_ref()?["warnings"].as_array());
         let mut warnings = view.warnings();
         warnings.extend(simulated.into_iter().flatten().cloned());
-        self.job.set_warnings(warnings, volume.non_finite());
+        self.job.set_warnings(warnings, non_finite_voxels);
     }
 }

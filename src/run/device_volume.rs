@@ -7,8 +7,7 @@ use std::sync::Arc;
 use crate::device::cells::Cells;
 use crate::device::{Buffer, Device};
 use crate::error::Result;
-use crate::render::Scene;
-use crate::volume::Volume;
+use crate::technique::PreparedView;
 
 /// How many of each kind are kept for a volume.
 const KEPT: usize = 8;
@@ -72,13 +71,15 @@ impl DeviceVolume {
         })
     }
 
-    /// The table of a scene's view for a step; `volume` is what this is of.
-    pub fn table(&self, device: &Device, scene: &Scene, volume: &Volume, step: f32) -> Result<Rc<Buffer>> {
-        self.tables.get_or_make((scene.own().clone(), step.to_bits()), || {
-            let table = scene.view().table(volume, step)?;
-            device.upload(bytemuck::cast_slice(&table), TABLE_PADDING).map(Rc::new)
-        })
+    /// The table for a step of a view of this; `own` are the technique and its own parameters.
+    pub fn table(&self, device: &Device, own: &Arc<str>, view: &dyn PreparedView, step: f32) -> Result<Rc<Buffer>> {
+        self.tables.get_or_make((own.clone(), step.to_bits()), || upload_table(device, view, step))
     }
+}
+
+/// The table of a view for a step on the device.
+pub(super) fn upload_table(device: &Device, view: &dyn PreparedView, step: f32) -> Result<Rc<Buffer>> {
+    device.upload(bytemuck::cast_slice(&view.table(step)), TABLE_PADDING).map(Rc::new)
 }
 
 #[cfg(test)]

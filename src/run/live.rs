@@ -11,8 +11,7 @@ use super::view_run::ViewRun;
 use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::job::{Job, NewestCamera};
-use crate::technique::ViewPlan;
-use crate::volume::Volume;
+use crate::technique::PreparedView;
 
 /// A turn of a field: its packets end at very different times, and a longer slice wastes fewer lanes on the last of them.
 const FIELD_SLICE: Duration = Duration::from_millis(40);
@@ -35,8 +34,8 @@ pub(super) enum Stage {
     AwaitsField,
     /// The field fills.
     Fills,
-    /// The view begins once its kernels are compiled. It is planned once, since that may take long.
-    AwaitsView(Arc<Volume>, ViewPlan),
+    /// The view begins once its kernels are compiled.
+    AwaitsView(Arc<dyn PreparedView>),
     /// The view makes one picture of a field that is not complete, which then goes on.
     Looks,
     /// The view refines the picture until its budget is used up.
@@ -140,7 +139,7 @@ impl Live {
         }
         match std::mem::replace(&mut self.stage, Stage::New) {
             Stage::AwaitsField => self.begin_field(context)?,
-            Stage::AwaitsView(volume, plan) => self.run_view(context, volume, plan)?,
+            Stage::AwaitsView(prepared) => self.run_view(context, prepared)?,
             stage => {
                 self.stage = stage;
                 self.follow_camera(context)?;
@@ -165,7 +164,7 @@ impl Live {
         if step.is_look_due || field.is_over() {
             let volume = field.look(context)?;
             self.job.set_field(&volume, field.is_over(), 1e3 * field.device_time.as_secs_f64());
-            self.begin_view(context, volume)?;
+            self.begin_view(context, Some(&volume))?;
         }
         Ok(Turn::Again)
     }

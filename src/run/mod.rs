@@ -33,8 +33,8 @@ use tokio::sync::{oneshot, watch};
 
 pub use compile::compile_kernels;
 use device_thread::{Command, DeviceThread};
-pub use sources::sources;
 use kernels::Kernels;
+pub use sources::sources;
 
 use crate::config::Limits;
 use crate::device::DeviceConfig;

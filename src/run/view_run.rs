@@ -13,7 +13,7 @@ use std::time::Duration;
 use serde_json::Value;
 
 use super::context::DeviceContext;
-use super::device_volume::DeviceVolume;
+use super::device_volume::{DeviceVolume, upload_table};
 use super::distances::distances;
 use super::gathered::{Gathered, Pass};
 use super::layer::packets_of_beam;
@@ -21,12 +21,12 @@ use super::motion::{Motion, Moving};
 use super::sample_offsets::sample_offset;
 use super::warnings::warnings;
 use crate::device::structs::View as DeviceView;
-use crate::device::{Buffer, Resume, SliceLength};
+use crate::device::{Buffer, Device, Resume, SliceLength};
 use crate::error::Result;
 use crate::render::Scene;
-use crate::scene;
-use crate::technique::{Random, ViewPlan};
-use crate::volume::Volume;
+use crate::scene::bounds::Bounds;
+use crate::scene::camera::flat_squared;
+use crate::technique::{PreparedView, Random, ViewPlan};
 
 /// The shortest step that `max_error` leads to, in voxels: the shortest that a request may ask for.
 const LEAST_STEP_VOXELS: f64 = 0.05;
@@ -38,9 +38,12 @@ const QUICK_MS: f64 = 50.0;
 /// A view at work.
 pub(super) struct ViewRun {
     scene: Scene,
-    /// What is looked at, and the same on the device.
-    looked_at: Arc<Volume>,
-    volume: Rc<DeviceVolume>,
+    prepared: Arc<dyn PreparedView>,
+    /// The box that it looks at, with its grid.
+    bounds: Bounds,
+    /// The volume that it reads, where it reads one.
+    volume: Option<Rc<DeviceVolume>>,
+    /// Its plan, with the step as it is by now.
     plan: ViewPlan,
     /// What the kernel is told of the cells, where that is not their ranges.
     distances: Option<Rc<Buffer>>,
@@ -73,30 +76,36 @@ pub(super) struct ViewRun {
 }
 
 impl ViewRun {
-    /// Begins what `plan` says, whose kernel is built; in the memory of what was gathered `before`.
+    /// Begins a view whose kernels are built, in the memory of what was gathered `before`.
     pub fn new(
         context: &mut DeviceContext,
         scene: Scene,
-        looked_at: Arc<Volume>,
-        mut plan: ViewPlan,
+        prepared: Arc<dyn PreparedView>,
         before: Option<Gathered>,
     ) -> Result<Self> {
-        let volume = &looked_at;
-        let on_device = context.volume(volume)?;
-        let distances = distances(context, &on_device, volume, &mut plan)?;
-        let view = Self::view(&scene, volume);
-        let table = |step| on_device.table(&context.device, &scene, volume, step);
+        let mut plan = prepared.plan().clone();
+        let (volume, distances) = match prepared.volume() {
+            Some(volume) => {
+                let on_device = context.volume(volume)?;
+                let distances = distances(context, &on_device, volume, &mut plan)?;
+                (Some(on_device), distances)
+            }
+            None => (None, None),
+        };
+        let bounds = prepared.volume().map_or(*scene.subject().bounds(), |volume| Bounds::from(&**volume));
+        let view = device_view(&scene, &*prepared, &bounds);
+        let table = |step| table(&context.device, volume.as_deref(), &scene, &*prepared, step);
         let tables = [table(2.0 * plan.step)?, table(plan.step)?];
         let gathered = Gathered::new(context, &scene, tables, &plan, is_paired(&view), before)?;
         let device = &context.device;
-        let parameters = device.upload(&scene.view().parameters(volume, scene.camera())?, 0)?;
+        let parameters = device.upload(&prepared.parameters(scene.camera()), 0)?;
         let view_buffer = device.allocate(size_of::<DeviceView>())?;
         let packets = if scene.view().random().is_some() { 1 } else { packets_of_beam(device.info().lanes as usize) };
         let resume = Resume::new(device, plan.state_words * packets)?;
         let (pass, cursor, device_time) = (None, 0, Duration::ZERO);
-        let longest = 2.0 * scene::radius(volume);
+        let longest = 2.0 * bounds.radius();
         let speed = context.speed(&plan.variant);
-        let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
+        let smallest = prepared.volume().map_or(bounds.smallest_side(), |volume| volume.smallest_side());
         Ok(Self {
             slice_length: SliceLength::new(context.device.info(), longest / f64::from(plan.step), speed),
             quick: quick(speed, gathered.size),
@@ -107,8 +116,9 @@ impl ViewRun {
             random: scene.view().random(),
             plan,
             scene,
-            looked_at,
-            volume: on_device,
+            prepared,
+            bounds,
+            volume,
             distances,
             parameters,
             view_buffer,
@@ -124,22 +134,11 @@ impl ViewRun {
         })
     }
 
-    /// What all passes are told.
-    fn view(scene: &Scene, volume: &Volume) -> DeviceView {
-        let mut view = scene.camera().device_view(scene.image(), scene.region().left_top, volume);
-        view.full_width = scene.image()[0] as i32;
-        view.seed = [scene.seed() as u32, (scene.seed() >> 32) as u32];
-        scene.clip().apply(volume, &mut view);
-        scene.view().set_shared(scene.camera(), &mut view);
-        view
-    }
-
     /// Another camera: everything gathered so far is of the old one.
     pub fn restart(&mut self, context: &mut DeviceContext, scene: &Scene) -> Result<()> {
         self.scene = scene.clone();
-        let volume = &*self.looked_at;
-        self.view = Self::view(scene, volume);
-        context.device.write(&mut self.parameters, 0, &scene.view().parameters(volume, scene.camera())?)?;
+        self.view = device_view(scene, &*self.prepared, &self.bounds);
+        context.device.write(&mut self.parameters, 0, &self.prepared.parameters(scene.camera()))?;
         let speed = context.speed(&self.plan.variant);
         self.slice_length = SliceLength::new(context.device.info(), self.longest / f64::from(self.plan.step), speed);
         self.quick = quick(speed, self.gathered.size);
@@ -177,7 +176,7 @@ impl ViewRun {
         self.slice_length = SliceLength::new(context.device.info(), self.longest / f64::from(self.plan.step), None);
         for (layer, step) in self.gathered.layers.iter_mut().zip([2.0 * self.plan.step, self.plan.step]) {
             (layer.samples, layer.step) = (0, step);
-            layer.table = self.volume.table(&context.device, &self.scene, &self.looked_at, step)?;
+            layer.table = table(&context.device, self.volume.as_deref(), &self.scene, &*self.prepared, step)?;
         }
         (self.pass, self.cursor, self.undone) = (None, 0, None);
         self.gathered.rounds.forget();
@@ -199,7 +198,7 @@ impl ViewRun {
 
     /// What a reader should know of the volume and of the parameters on it.
     pub fn warnings(&self) -> Vec<Value> {
-        warnings(&self.looked_at, &self.scene)
+        warnings(&self.scene, &*self.prepared, &self.bounds)
     }
 
     /// The camera moves: where all of the picture would be late, the first frame has less of what loses the least.
@@ -212,7 +211,8 @@ impl ViewRun {
         self.gathered.will_change();
         let before = self.gathered.moving.take();
         if !lowered.is_none() {
-            let table = self.volume.table(&context.device, &self.scene, &self.looked_at, lowered.step * step)?;
+            let step_now = lowered.step * step;
+            let table = table(&context.device, self.volume.as_deref(), &self.scene, &*self.prepared, step_now)?;
             self.gathered.moving = Some(Moving::new(context, &self.scene, table, step, lowered, step_loss, before)?);
         }
         Ok(())
@@ -292,6 +292,31 @@ impl ViewRun {
         self.pass = Some(pass);
         (self.pass_time, self.shortest_slice) = (Duration::ZERO, Duration::MAX);
         Ok(pass)
+    }
+}
+
+/// What all passes of a view are told.
+fn device_view(scene: &Scene, prepared: &dyn PreparedView, bounds: &Bounds) -> DeviceView {
+    let mut view = scene.camera().device_view(scene.image(), scene.region().left_top, bounds);
+    view.full_width = scene.image()[0] as i32;
+    view.seed = [scene.seed() as u32, (scene.seed() >> 32) as u32];
+    view.flat_squared = prepared.volume().map_or(0.0, |volume| flat_squared(volume));
+    scene.clip().apply(bounds, &mut view);
+    prepared.set_shared(scene.camera(), &mut view);
+    view
+}
+
+/// A view's table for a step, kept with the volume where it looks at one.
+fn table(
+    device: &Device,
+    volume: Option<&DeviceVolume>,
+    scene: &Scene,
+    prepared: &dyn PreparedView,
+    step: f32,
+) -> Result<Rc<Buffer>> {
+    match volume {
+        Some(volume) => volume.table(device, scene.own(), prepared, step),
+        None => upload_table(device, prepared, step),
     }
 }
 

@@ -3,10 +3,22 @@
 use serde_json::{Value, json};
 
 use crate::render::Scene;
+use crate::scene::bounds::Bounds;
+use crate::technique::PreparedView;
 use crate::volume::Volume;
 
-/// The warnings of a volume that a scene looks at, in codes and words.
-pub(super) fn warnings(volume: &Volume, scene: &Scene) -> Vec<Value> {
+/// The warnings of what a scene looks at, which fills the box, in codes and words.
+pub(super) fn warnings(scene: &Scene, view: &dyn PreparedView, bounds: &Bounds) -> Vec<Value> {
+    let mut warnings = view.volume().map_or(Vec::new(), |volume| of_volume(volume));
+    if scene.clip().removes_all(bounds) {
+        let message = "the clipping planes leave nothing of the volume";
+        warnings.push(json!({"code": "clipped_away", "message": message}));
+    }
+    warnings.extend(view.warnings());
+    warnings
+}
+
+fn of_volume(volume: &Volume) -> Vec<Value> {
     let mut warnings: Vec<Value> =
         volume.notes().iter().map(|n| json!({"code": "volume_note", "message": n})).collect();
     if volume.non_finite() > 0 {
@@ -18,10 +30,5 @@ pub(super) fn warnings(volume: &Volume, scene: &Scene) -> Vec<Value> {
             json!({"code": "non_finite_voxels", "message": message, "measured": volume.non_finite(), "bound": 0}),
         );
     }
-    if scene.clip().removes_all(volume) {
-        let message = "the clipping planes leave nothing of the volume";
-        warnings.push(json!({"code": "clipped_away", "message": message}));
-    }
-    warnings.extend(scene.view().warnings(volume));
     warnings
 }

@@ -1,7 +1,8 @@
 //! The camera: validated, in double precision, and what the device is told of it.
 
-use glam::{DAffine3, DMat3, DMat4, DVec3};
+use glam::{DMat3, DMat4, DVec3};
 
+use super::bounds::Bounds;
 use crate::device::structs::View;
 use crate::error::{Error, Result};
 use crate::request::CameraRequest;
@@ -34,11 +35,11 @@ fn finite(v: [f64; 3], at: &str) -> Result<DVec3> {
 }
 
 impl Camera {
-    /// A camera from a request, framing `volume` where the request is silent.
+    /// A camera from a request, framing the box where the request is silent.
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the field under `/camera`.
-    pub fn from_request(request: Option<&CameraRequest>, volume: &Framing) -> Result<Self> {
+    pub fn from_request(request: Option<&CameraRequest>, bounds: &Bounds) -> Result<Self> {
         let empty = CameraRequest::default();
         let r = request.unwrap_or(&empty);
         let fov_y_deg = r.fov_y_deg.unwrap_or(DEFAULT_FOV_Y_DEG);
@@ -53,10 +54,10 @@ impl Camera {
             return Self::from_matrix(matrix, fov_y_deg, perspective);
         }
         let target = r.target.map_or(Ok(DVec3::ZERO), |t| finite(t, "/camera/target"))?;
-        let up = r.up.map_or(Ok(volume.up()), |u| finite(u, "/camera/up"))?;
+        let up = r.up.map_or(Ok(bounds.up()), |u| finite(u, "/camera/up"))?;
         let eye = match r.eye {
             Some(eye) => finite(eye, "/camera/eye")?,
-            None => target + volume.direction() * volume.distance(up, fov_y_deg),
+            None => target + bounds.direction() * bounds.distance(up, fov_y_deg),
         };
         Self::look_at(eye, target, up, fov_y_deg, perspective)
     }
@@ -124,13 +125,13 @@ impl Camera {
         2.0 * (self.target - self.eye).length() * (0.5 * self.fov_y_deg.to_radians()).tan()
     }
 
-    /// What the device is told for an image of `size` pixels of a volume: the plane near the volume and its pixels, worked out
+    /// What the device is told for an image of `size` pixels of what is in a box: the plane near the box and its pixels, worked out
     /// in double precision so that a far eye costs no digits; its first pixel is the one at `left`, `top`. The fields of the pass are left at
     /// zero.
-    pub(crate) fn device_view(&self, size: [u32; 2], [left, top]: [u32; 2], volume: &Volume) -> View {
-        let index_from_world = volume.world_from_index().inverse();
-        let radius = super::radius(volume);
-        // The plane through the volume's centre; an eye inside or behind gets one just ahead of it instead.
+    pub(crate) fn device_view(&self, size: [u32; 2], [left, top]: [u32; 2], bounds: &Bounds) -> View {
+        let index_from_world = bounds.world_from_index().inverse();
+        let radius = bounds.radius();
+        // The plane through the box's centre; an eye inside or behind gets one just ahead of it instead.
         let ahead = (-self.eye.dot(self.forward)).max(0.1 * radius);
         let reach = if self.perspective { ahead } else { (self.target - self.eye).length() };
         let pixel = 2.0 * reach * (0.5 * self.fov_y_deg.to_radians()).tan() / f64::from(size[1]);
@@ -151,12 +152,11 @@ impl Camera {
             down_world: narrow(down),
             t_eye: ahead as f32,
             perspective: if self.perspective { -1 } else { 0 },
-            dims: volume.dims().map(|n| n as i32),
+            dims: bounds.dims().map(|n| n as i32),
             // A gradient is a covector: it goes to the world by the transpose of index-from-world. The sign of the slope does
             // not matter, since lights are two-sided.
-            world_gradient_from_index: volume.world_from_index().matrix3.inverse().to_cols_array().map(|v| v as f32),
-            isotropic_squared: isotropic_squared(volume),
-            flat_squared: flat_squared(volume),
+            world_gradient_from_index: bounds.world_from_index().matrix3.inverse().to_cols_array().map(|v| v as f32),
+            isotropic_squared: isotropic_squared(bounds),
             jittered: 1,
             place: 0.5,
             ..View::default()
@@ -165,63 +165,20 @@ impl Camera {
 }
 
 /// See [`View::isotropic_squared`].
-fn isotropic_squared(volume: &Volume) -> f32 {
-    let from_index = volume.world_from_index().matrix3.inverse();
+fn isotropic_squared(bounds: &Bounds) -> f32 {
+    let from_index = bounds.world_from_index().matrix3.inverse();
     let square = from_index * from_index.transpose();
     let side = square.x_axis.x;
     let even = (square - DMat3::from_diagonal(DVec3::splat(side))).abs_diff_eq(DMat3::ZERO, 1e-6 * side);
     if even { side as f32 } else { 0.0 }
 }
 
-/// What rounding alone may make of a gradient, squared: values are interpolated to about 2^-15 of their range.
-fn flat_squared(volume: &Volume) -> f32 {
+/// [`View::flat_squared`] of a volume: what rounding alone may make of a gradient, squared, where values are interpolated to about 2^-15
+/// of their range.
+pub(crate) fn flat_squared(volume: &Volume) -> f32 {
     let [low, high] = volume.range();
-    let voxel = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
+    let voxel = volume.smallest_side();
     (3e-5 * (high - low) / volume.slope().abs() / voxel).powi(2).max(1e-24) as f32
-}
-
-/// What is needed of a volume to frame it: its box in the world and which way is up.
-#[derive(Debug, Clone, Copy)]
-pub struct Framing {
-    corners: [DVec3; 8],
-    scan: bool,
-}
-
-impl Framing {
-    /// The framing of a box given by its transform and voxels; `scan` when its world axes are a patient's.
-    pub fn new(world_from_index: &DAffine3, dims: [usize; 3], scan: bool) -> Self {
-        let corner = |i: usize| {
-            let pick = |axis: usize| if i >> axis & 1 == 1 { dims[axis] as f64 } else { 0.0 };
-            world_from_index.transform_point3(DVec3::new(pick(0), pick(1), pick(2)))
-        };
-        Self { corners: std::array::from_fn(corner), scan }
-    }
-
-    /// Which way is up: z for a scan, y for what has no patient.
-    pub fn up(&self) -> DVec3 {
-        if self.scan { DVec3::Z } else { DVec3::Y }
-    }
-
-    /// From the centre to the eye: a patient's face a little from the side and above; a built-in from where the chamber is open.
-    fn direction(&self) -> DVec3 {
-        if self.scan { DVec3::new(-0.55, 1.0, 0.3).normalize() } else { DVec3::new(0.45, 0.32, -1.0).normalize() }
-    }
-
-    /// The distance at which every corner is inside a square picture, with a margin of 4 %.
-    fn distance(&self, up: DVec3, fov_y_deg: f64) -> f64 {
-        let back = self.direction();
-        let right = up.cross(back).normalize_or(DVec3::X);
-        let across = back.cross(right);
-        let tangent = (0.5 * fov_y_deg.to_radians()).tan();
-        let needs = |c: &DVec3| c.dot(right).abs().max(c.dot(across).abs()) / tangent + c.dot(back);
-        1.04 * self.corners.iter().map(needs).fold(0.0, f64::max).max(1e-3)
-    }
-}
-
-impl From<&Volume> for Framing {
-    fn from(volume: &Volume) -> Self {
-        Self::new(&volume.world_from_index(), volume.dims(), !matches!(volume.format(), "builtin" | "field"))
-    }
 }
 
 #[cfg(test)]
@@ -230,11 +187,11 @@ mod tests {
 
     #[test]
     fn a_part_of_the_picture_is_seen_as_in_the_whole() -> Result<()> {
-        let volume = crate::volume::builtin::build("sphere", 16, 0)?;
+        let bounds = Bounds::from(&crate::volume::builtin::build("sphere", 16, 0)?);
         for perspective in [true, false] {
             let (eye, up) = (DVec3::new(0.7, 0.5, 3.0), DVec3::Y);
             let camera = Camera::look_at(eye, DVec3::new(0.1, 0.0, 0.0), up, 40.0, perspective)?;
-            let [whole, part] = [[0, 0], [30, 7]].map(|corner| camera.device_view([64, 48], corner, &volume));
+            let [whole, part] = [[0, 0], [30, 7]].map(|corner| camera.device_view([64, 48], corner, &bounds));
             for axis in 0..3 {
                 let moved = 30.0 * whole.right[axis] + 7.0 * whole.down[axis];
                 assert!(

@@ -2,10 +2,10 @@
 
 use glam::DVec3;
 
+use super::bounds::Bounds;
 use crate::device::structs::{PLANES, View};
 use crate::error::{Error, Result};
 use crate::request::ClipRequest;
-use crate::volume::Volume;
 
 /// Valid planes: n · p + d is not negative where the volume is shown; world units.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -41,19 +41,15 @@ impl Clip {
         Ok(Self { planes })
     }
 
-    /// True if nothing of the volume is left: all its corners are on the wrong side of one plane.
-    pub fn removes_all(&self, volume: &Volume) -> bool {
-        let size = DVec3::from_array(volume.dims().map(|n| n as f64));
-        let corner = |i: usize| DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64) * size;
-        let outside = |(n, d): &(DVec3, f64)| {
-            (0..8).all(|i| n.dot(volume.world_from_index().transform_point3(corner(i))) + d <= 0.0)
-        };
-        self.planes.iter().any(outside)
+    /// True if nothing of what is in the box is left: all its corners are on the wrong side of one plane.
+    pub fn removes_all(&self, bounds: &Bounds) -> bool {
+        let corners = bounds.corners();
+        self.planes.iter().any(|(n, d)| corners.iter().all(|corner| n.dot(*corner) + d <= 0.0))
     }
 
     /// Tells the device, in index units.
-    pub fn apply(&self, volume: &Volume, view: &mut View) {
-        let world_from_index = volume.world_from_index();
+    pub fn apply(&self, bounds: &Bounds, view: &mut View) {
+        let world_from_index = bounds.world_from_index();
         view.planes = self.planes.len().min(PLANES) as i32;
         for (i, (n, d)) in self.planes.iter().take(PLANES).enumerate() {
             let normal = world_from_index.matrix3.transpose() * *n;

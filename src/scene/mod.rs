@@ -1,6 +1,7 @@
 //! The parts of a scene: camera, clipping planes, transfer function, window, medium, lights. Each is made from its wire type and is valid
 //! from then on.
 
+pub mod bounds;
 pub mod camera;
 pub mod clip;
 pub mod depth;
@@ -14,15 +15,7 @@ pub mod transfer;
 mod transfer_request;
 pub mod window;
 
-use glam::DVec3;
-
 use crate::volume::Volume;
-
-/// The radius of the sphere around a volume's box, world units.
-pub(crate) fn radius(volume: &Volume) -> f64 {
-    let [x, y, z] = volume.dims().map(|n| n as f64);
-    0.5 * volume.world_from_index().transform_vector3(DVec3::new(x, y, z)).length()
-}
 
 /// The mean side of a volume's box, world units.
 pub(crate) fn mean_side(volume: &Volume) -> f64 {

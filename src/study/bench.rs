@@ -5,6 +5,7 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 use tokio::runtime::Handle;
 
+use crate::asset::Assets;
 use crate::config::{DeviceArgs, Limits};
 use crate::device::DeviceInfo;
 use crate::error::Result;
@@ -12,7 +13,7 @@ use crate::film::{Film, SURE};
 use crate::job::Job;
 use crate::plan::Plan;
 use crate::service::Service;
-use crate::volume::{RawQuery, Store};
+use crate::volume::RawQuery;
 
 /// The numbers of a finished render that are compared with a truth.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -95,9 +96,9 @@ impl Bench {
         &self.device
     }
 
-    /// The volumes.
-    pub fn store(&self) -> &Store {
-        self.service.store()
+    /// What is stored.
+    pub fn assets(&self) -> &Assets {
+        self.service.assets()
     }
 
     /// Runs a request to its end.
@@ -176,7 +177,7 @@ impl Bench {
             spacing: Some(spacing.map(|s| s.to_string()).join(",")),
             endian: None,
         };
-        Ok(json!({"id": self.service.store().insert(bytes, "study", query.parse()?)?.1}))
+        Ok(json!({"id": self.service.assets().volumes().insert(bytes, "study", query.parse()?)?.1}))
     }
 }
 

@@ -16,7 +16,7 @@ use serde_json::Value;
 use crate::device::Device;
 use crate::device::program::Variant;
 use crate::error::Result;
-use crate::scene::camera::Framing;
+use crate::scene::bounds::Bounds;
 use crate::volume::Volume;
 
 /// How much of its work a process has done.
@@ -79,8 +79,8 @@ pub trait Process {
 
 /// A field with valid parameters.
 pub trait Field: Send + Sync {
-    /// The framing of its grid.
-    fn framing(&self) -> Framing;
+    /// The box of its grid.
+    fn bounds(&self) -> Bounds;
     /// The kernel variants that its process runs: they are compiled before it begins.
     ///
     /// # Errors

@@ -14,6 +14,7 @@ pub mod slab;
 pub mod slice;
 mod stepping;
 mod steps;
+mod subject;
 mod view;
 pub mod volume_path;
 
@@ -21,15 +22,16 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
+use crate::asset::Assets;
 use crate::config::Limits;
 use crate::device::enums::{Count, DeviceEnum};
 use crate::device::program::Source;
 use crate::error::Result;
 use crate::scene::interpolation::Interpolation;
-use crate::volume::Store;
 pub use case::{Case, Cases};
 pub use field::{Field, Look, Process, Progress, Step};
-pub use view::{CellUse, Open, Random, Setting, Settings, View, ViewPlan};
+pub use subject::{AskedField, Subject};
+pub use view::{CellUse, Open, PreparedView, Random, Setting, Settings, View, ViewPlan};
 
 /// Every technique. Adding one is one line.
 pub const ALL: &[Technique] = &[
@@ -80,17 +82,17 @@ pub struct Technique {
 pub enum Kind {
     /// Turns a camera into an image.
     View {
-        /// Makes the view.
-        parse: fn(&Value, &str) -> Result<Arc<dyn View>>,
+        /// Makes the view; its parameters may name what is stored.
+        parse: fn(&Value, &str, &Assets) -> Result<Arc<dyn View>>,
         /// The technique that leaves nothing of the scene out, of which this is one setting: itself, as a rule.
         complete: &'static str,
         /// A scene by which its speed on a device is measured for the planner; where it has none, the first technique's speed stands for it.
         calibration: Option<fn() -> Value>,
     },
-    /// Fills a grid; its parameters may name volumes of the store.
+    /// Fills a grid.
     Field {
-        /// Makes the field.
-        parse: fn(&Value, &str, &Store) -> Result<Arc<dyn Field>>,
+        /// Makes the field; its parameters may name what is stored.
+        parse: fn(&Value, &str, &Assets) -> Result<Arc<dyn Field>>,
         /// How much of it there may be.
         work: Work,
     },

@@ -57,14 +57,15 @@ use glam::{DAffine3, DMat3, DVec3};
 use serde_json::{Value, json};
 
 use super::{Field, Kind, Process, Technique, Work};
+use crate::asset::Assets;
 use crate::device::enums::{DeviceEnum, PhaseKind};
 use crate::device::program::{Source, Variant};
 use crate::device::structs::DeviceStruct;
 use crate::device::{Device, Resume};
 use crate::error::{Error, Result};
 use crate::request;
-use crate::scene::camera::Framing;
-use crate::volume::{NewVolume, Store, Voxels};
+use crate::scene::bounds::Bounds;
+use crate::volume::{NewVolume, Voxels};
 use device::{BoundaryKind, LedgerEntry, Media, MediumNumber, STATE_WORDS, SourceKind, Tally};
 pub use device::{FieldPass, PhotonTransport};
 use geometry::Geometry;
@@ -132,13 +133,13 @@ struct Simulation {
     reasons: Vec<String>,
 }
 
-fn parse(parameters: &Value, at: &str, store: &Store) -> Result<Arc<dyn Field>> {
-    Ok(Arc::new(Arc::new(simulation(parameters, at, store)?)))
+fn parse(parameters: &Value, at: &str, assets: &Assets) -> Result<Arc<dyn Field>> {
+    Ok(Arc::new(Arc::new(simulation(parameters, at, assets)?)))
 }
 
-fn simulation(parameters: &Value, at: &str, store: &Store) -> Result<Simulation> {
+fn simulation(parameters: &Value, at: &str, assets: &Assets) -> Result<Simulation> {
     let p: Parameters = request::read(parameters, at)?;
-    let geometry = Geometry::new(&p, store, at)?;
+    let geometry = Geometry::new(&p, assets, at)?;
     let source = p.source.resolve(geometry.size_mm, geometry.chamber, &format!("{at}/source"))?;
     if let Some(histogram) = &p.exit_histogram {
         for (name, edges) in
@@ -201,11 +202,11 @@ fn simulation(parameters: &Value, at: &str, store: &Store) -> Result<Simulation>
 }
 
 impl Field for Arc<Simulation> {
-    fn framing(&self) -> Framing {
+    fn bounds(&self) -> Bounds {
         let spacing = DVec3::from(self.spacing_mm());
         let translation = -0.5 * DVec3::from(self.geometry.size_mm);
         let world_from_index = DAffine3 { matrix3: DMat3::from_diagonal(spacing), translation };
-        Framing::new(&world_from_index, self.geometry.dims, false)
+        Bounds::new(world_from_index, self.geometry.dims, false)
     }
 
     fn kernels(&self) -> Result<Vec<Variant>> {

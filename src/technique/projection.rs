@@ -42,6 +42,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::{Kind, Technique, View};
+use crate::asset::Assets;
 use crate::error::{Error, Result};
 use crate::request;
 use crate::scene::interpolation::Interpolation;
@@ -183,7 +184,7 @@ pub fn example() -> Value {
     })
 }
 
-fn parse(parameters: &Value, at: &str) -> Result<Arc<dyn View>> {
+fn parse(parameters: &Value, at: &str, _: &Assets) -> Result<Arc<dyn View>> {
     let parameters: Parameters = request::read(parameters, at)?;
     if let Some(window) = &parameters.window {
         window.check(&format!("{at}/window"))?;

@@ -27,6 +27,7 @@ use serde_json::{Value, json};
 use super::case::{Cases, tiny};
 use super::scattering::{self, Parameters, Scatterer};
 use super::{Kind, Technique, View};
+use crate::asset::Assets;
 use crate::device::program::Source;
 use crate::error::Result;
 use crate::request;
@@ -71,7 +72,7 @@ fn source() -> Source {
     scattering::source(TECHNIQUE.name)
 }
 
-fn parse(parameters: &Value, at: &str) -> Result<Arc<dyn View>> {
+fn parse(parameters: &Value, at: &str, _: &Assets) -> Result<Arc<dyn View>> {
     let parameters: Parameters = request::read(parameters, at)?;
     Ok(Arc::new(Scatterer::new(TECHNIQUE.name, parameters, at)?))
 }

@@ -35,6 +35,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::{Kind, Technique, View};
+use crate::asset::Assets;
 use crate::device_struct;
 use crate::error::{Error, Result};
 use crate::request;
@@ -154,7 +155,7 @@ pub fn example() -> Value {
     })
 }
 
-fn parse(parameters: &Value, at: &str) -> Result<Arc<dyn View>> {
+fn parse(parameters: &Value, at: &str, _: &Assets) -> Result<Arc<dyn View>> {
     let parameters: Parameters = request::read(parameters, at)?;
     if let Some(window) = &parameters.window {
         window.check(&format!("{at}/window"))?;

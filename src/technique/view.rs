@@ -4,10 +4,12 @@ use std::sync::Arc;
 
 use serde_json::{Map, Value};
 
+use super::Subject;
 use super::optics::Optics;
 use crate::device::program::Variant;
 use crate::device::structs::View as DeviceView;
 use crate::error::Result;
+use crate::scene::bounds::Bounds;
 use crate::scene::camera::Camera;
 use crate::volume::Volume;
 
@@ -58,47 +60,19 @@ impl Random {
 
 /// A view with valid parameters.
 pub trait View: Send + Sync {
-    /// A difference of values that plays no part in the picture; none where all do. Where words are finer, floats are taken as words.
+    /// The view of a subject: all that does not depend on the camera is worked out, once. It may take a while, as where floats are taken as
+    /// words.
     ///
     /// # Errors
-    /// As [`View::plan`].
-    fn resolution(&self, _volume: &Volume) -> Result<Option<f64>> {
-        Ok(None)
+    /// `Error::Invalid` where parameters and subject do not go together.
+    fn prepare(&self, subject: &Subject) -> Result<Arc<dyn PreparedView>>;
+    /// The box of what the view shows by its own parameters, where it does: it may look at that alone. A view without one looks at a volume.
+    fn bounds(&self) -> Option<Bounds> {
+        None
     }
-    /// The plan for `volume`.
-    ///
-    /// # Errors
-    /// `Error::Invalid` where parameters and volume do not go together.
-    fn plan(&self, volume: &Volume) -> Result<ViewPlan>;
-    /// The kernel's own parameters for a camera, as the bytes of its device struct.
-    ///
-    /// # Errors
-    /// As [`View::plan`].
-    fn parameters(&self, volume: &Volume, camera: &Camera) -> Result<Vec<u8>>;
-    /// The kernel's read-only table for a step, such as a transfer function's opacities.
-    ///
-    /// # Errors
-    /// As [`View::plan`].
-    fn table(&self, _volume: &Volume, _step: f32) -> Result<Vec<u32>> {
-        Ok(Vec::new())
-    }
-    /// Sets fields that all views share, such as its lights.
-    fn set_shared(&self, _camera: &Camera, _view: &mut DeviceView) {}
     /// True if clipping planes cut it.
     fn clips(&self) -> bool {
         true
-    }
-    /// The settings that the planner may choose in its place on a volume; `None` where there is nothing to choose.
-    fn settings(&self, _volume: &Volume, _open: &Open<'_>) -> Option<Settings> {
-        None
-    }
-    /// The optics of the scene, where it scatters light.
-    fn optics(&self, _volume: &Volume) -> Option<Optics> {
-        None
-    }
-    /// The greatest change of opacity per unit of length with the value, where a transfer function gives it.
-    fn steepest_slope(&self, _volume: &Volume) -> Option<f64> {
-        None
     }
     /// True if values are labels, of which there is no mean.
     fn shows_labels(&self) -> bool {
@@ -108,9 +82,49 @@ pub trait View: Send + Sync {
     fn random(&self) -> Option<Random> {
         None
     }
-    /// Warnings about the parameters on this volume: objects with `code` and `message`.
-    fn warnings(&self, _volume: &Volume) -> Vec<Value> {
+}
+
+/// A view of a subject.
+pub trait PreparedView: Send + Sync {
+    /// Its plan.
+    fn plan(&self) -> &ViewPlan;
+    /// The volume that its kernel reads: the subject's, or that in words. None where it looks at none.
+    fn volume(&self) -> Option<&Arc<Volume>>;
+    /// The kernel's own parameters for a camera, as the bytes of its device struct.
+    fn parameters(&self, camera: &Camera) -> Vec<u8>;
+    /// The kernel's read-only table for a step, such as a transfer function's opacities.
+    fn table(&self, _step: f32) -> Vec<u32> {
         Vec::new()
+    }
+    /// Sets fields that all views share, such as its lights.
+    fn set_shared(&self, _camera: &Camera, _view: &mut DeviceView) {}
+    /// The settings that the planner may choose in its place; `None` where there is nothing to choose.
+    fn settings(&self, _open: &Open<'_>) -> Option<Settings> {
+        None
+    }
+    /// The optics of the scene, where it scatters light.
+    fn optics(&self) -> Option<Optics> {
+        None
+    }
+    /// The greatest change of opacity per unit of length with the value, where a transfer function gives it.
+    fn steepest_slope(&self) -> Option<f64> {
+        None
+    }
+    /// Warnings about the parameters on this subject: objects with `code` and `message`.
+    fn warnings(&self) -> Vec<Value> {
+        Vec::new()
+    }
+}
+
+/// The volume in words of 16 bits where it has floats and a difference of `resolution` between values plays no part in the picture, with what
+/// that does to values, in words; else the volume as it is.
+pub(super) fn in_words(volume: &Arc<Volume>, resolution: Option<f64>) -> (Arc<Volume>, Option<String>) {
+    match resolution.and_then(|resolution| volume.words(resolution)) {
+        Some(words) => {
+            let half = 0.5 * words.word_step();
+            (words, Some(format!("floats are taken as words of 16 bits: values are off by {half:.1e} at most")))
+        }
+        None => (volume.clone(), None),
     }
 }
 

@@ -30,6 +30,7 @@ use serde_json::{Value, json};
 use super::case::{Cases, tiny};
 use super::scattering::{self, Parameters, Scatterer};
 use super::{Kind, Technique, View};
+use crate::asset::Assets;
 use crate::device::program::Source;
 use crate::error::Result;
 use crate::request;
@@ -70,17 +71,14 @@ fn cases() -> Cases {
     let medium = json!({"sigma_t_per_unit": [2, 3, 4], "emission": 0.1, "phase": table});
     let own = json!({"adaptive": true, "medium": medium, "lights": lights});
     let glass = json!({"medium": {"sigma_t_per_unit": 2, "index": 1.5}, "lights": [{"type": "sky"}]});
-    scattering::cases(vec![
-        tiny(TECHNIQUE.name, "sphere", 10, 2, &own),
-        tiny(TECHNIQUE.name, "constant", 8, 2, &glass),
-    ])
+    scattering::cases(vec![tiny(TECHNIQUE.name, "sphere", 10, 2, &own), tiny(TECHNIQUE.name, "constant", 8, 2, &glass)])
 }
 
 fn source() -> Source {
     scattering::source(TECHNIQUE.name)
 }
 
-fn parse(parameters: &Value, at: &str) -> Result<Arc<dyn View>> {
+fn parse(parameters: &Value, at: &str, _: &Assets) -> Result<Arc<dyn View>> {
     let parameters: Parameters = request::read(parameters, at)?;
     Ok(Arc::new(Scatterer::new(TECHNIQUE.name, parameters, at)?))
 }

@@ -7,6 +7,11 @@ use std::io::{ErrorKind, Read};
 /// Deflate cannot shrink by more than this (a 258-byte match takes at least 2 bits): the bound on what a body can hold.
 const MAX_RATIO: u64 = 1032;
 
+/// True if the bytes begin as gzip does (RFC 1952: the magic, and deflate, its only method).
+pub(crate) fn is_gzip(bytes: &[u8]) -> bool {
+    bytes.starts_with(&[0x1f, 0x8b, 8])
+}
+
 /// A forward reader over a plain or gzipped body.
 pub(super) enum Source<'a> {
     /// The bytes that are left.
@@ -21,11 +26,6 @@ pub(super) enum Source<'a> {
 }
 
 impl<'a> Source<'a> {
-    /// True if the bytes begin as gzip does (RFC 1952: the magic, and deflate, its only method).
-    pub fn is_gzip(bytes: &[u8]) -> bool {
-        bytes.starts_with(&[0x1f, 0x8b, 8])
-    }
-
     /// Reads the bytes as they are.
     pub fn plain(bytes: &'a [u8]) -> Self {
         Self::Plain(bytes)

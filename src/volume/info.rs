@@ -88,7 +88,7 @@ impl VolumeInfo {
     }
 
     /// Of a built-in at its default resolution, without building it.
-    pub(super) fn of_unbuilt(builtin: &Builtin) -> Self {
+    pub(crate) fn of_unbuilt(builtin: &Builtin) -> Self {
         let n = builtin::DEFAULT_RESOLUTION;
         let step = 2.0 / n as f64;
         let mut world_from_index = DMat4::from_scale(glam::DVec3::splat(step));
@@ -116,7 +116,7 @@ impl VolumeInfo {
     }
 
     /// The same without its histogram, for lists.
-    pub(super) fn brief(mut self) -> Self {
+    pub(crate) fn brief(mut self) -> Self {
         self.histogram = None;
         self
     }

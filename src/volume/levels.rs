@@ -95,7 +95,7 @@ impl Volume {
     }
 
     /// Bytes of the volume, of the levels that were made of it, and of all their words.
-    pub(super) fn bytes_in_all(&self) -> u64 {
+    pub(crate) fn bytes_in_all(&self) -> u64 {
         let words = self.words.get().and_then(Option::as_ref).map_or(0, |words| words.bytes());
         let levels = self.levels.iter().filter_map(OnceLock::get);
         self.bytes() + words + levels.map(|level| level.bytes_in_all()).sum::<u64>()

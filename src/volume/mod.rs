@@ -9,7 +9,6 @@
 
 mod bright;
 pub mod builtin;
-mod cache;
 mod inflate;
 mod info;
 mod levels;
@@ -23,11 +22,10 @@ mod range;
 mod raw;
 mod read;
 mod samples;
-mod store;
-mod store_files;
 mod voxels;
 mod words;
 
+pub(crate) use inflate::is_gzip;
 pub use info::VolumeInfo;
 pub use levels::MOST_LEVEL;
 pub use limits::VolumeLimits;
@@ -35,7 +33,6 @@ pub use nrrd_write::write_nrrd;
 pub use raw::{RawParams, RawQuery};
 pub use read::{FORMATS, read};
 pub use samples::{Endian, RawType};
-pub use store::{Store, StoreLimits};
 pub use voxels::{Histogram, VoxelType, Voxels};
 
 use crate::error::{Error, Result};
@@ -129,6 +126,11 @@ impl Volume {
     /// World distance between neighbouring voxels along each index axis.
     pub fn spacing(&self) -> [f64; 3] {
         self.parts.spacing
+    }
+
+    /// The smallest of them.
+    pub fn smallest_side(&self) -> f64 {
+        self.spacing().into_iter().fold(f64::INFINITY, f64::min)
     }
 
     /// The voxels in the type of their file, x fastest, then y, then z.

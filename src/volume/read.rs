@@ -1,6 +1,6 @@
 //! Which format a body has, and the limits that all formats share.
 
-use super::inflate::Source;
+use super::inflate::{Source, is_gzip};
 use super::limits::VolumeLimits;
 use super::raw::RawParams;
 use super::{Volume, nifti, nrrd, raw};
@@ -27,7 +27,7 @@ pub fn read(bytes: &[u8], name: &str, raw: Option<RawParams>, limits: &VolumeLim
     if let Some(params) = raw {
         return raw::read(bytes, &name, &params, limits);
     }
-    if Source::is_gzip(bytes) {
+    if is_gzip(bytes) {
         let mut start = [0; nifti::HEADER_BYTES];
         let got = Source::gzip(bytes).fill(&mut start)?;
         return match nifti::is_nifti(&start[..got]) {

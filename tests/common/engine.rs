@@ -1,23 +1,32 @@
 //! The engine in this process, for tests that look at the film itself in linear floats.
 
-use std::sync::{Arc, Mutex, OnceLock};
+use std::sync::{Arc, OnceLock};
 
 use clap::Parser;
+use cloudchamber::asset::Assets;
 use cloudchamber::config::Limits;
-use cloudchamber::device::{self, DeviceConfig, DeviceInfo};
+use cloudchamber::device::program::Variant;
+use cloudchamber::device::{DeviceConfig, DeviceInfo};
 use cloudchamber::error::Error;
 use cloudchamber::film::{ErrorEstimate, Film};
 use cloudchamber::job::Job;
 use cloudchamber::render::Scene;
 use cloudchamber::service::Service;
 use cloudchamber::study::bench::Bench;
-use cloudchamber::volume::Store;
 use serde_json::{Value, json};
 
 #[derive(Parser)]
 struct Flags {
     #[command(flatten)]
     limits: Limits,
+}
+
+/// The kernels that a scene's field runs, or else its view.
+pub fn kernels_of(scene: &Scene) -> Vec<Variant> {
+    match scene.subject().field() {
+        Some(asked) => asked.field.kernels().unwrap(),
+        None => vec![scene.view().prepare(scene.subject()).unwrap().plan().variant],
+    }
 }
 
 /// A service with a store of its own.
@@ -30,9 +39,7 @@ pub struct House {
 impl House {
     /// A house on a device.
     pub fn on(config: DeviceConfig) -> Self {
-        static ONCE: Mutex<()> = Mutex::new(());
-        let _one_at_a_time = ONCE.lock().unwrap();
-        device::keep_compiled_kernels_in(&super::kernel_cache()).unwrap();
+        super::keep_kernels();
         let data = tempfile::tempdir().unwrap();
         let limits = Flags::parse_from(["test", "--keep-film-bytes", "1000000000"]).limits;
         let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().unwrap();
@@ -42,9 +49,9 @@ impl House {
         Self { service, runtime, _data: data }
     }
 
-    /// The stored volumes.
-    pub fn store(&self) -> &Store {
-        self.service.store()
+    /// What is stored.
+    pub fn assets(&self) -> &Assets {
+        self.service.assets()
     }
 
     /// The scene of a request, or why it is refused.
@@ -61,7 +68,8 @@ impl House {
     /// A shared one with so many lanes.
     pub fn of_lanes(lanes: u32) -> &'static Self {
         static HOUSES: [OnceLock<House>; 5] = [const { OnceLock::new() }; 5];
-        HOUSES[lanes.ilog2() as usize].get_or_init(|| Self::on(DeviceConfig { lanes: Some(lanes), ..DeviceConfig::pocl() }))
+        HOUSES[lanes.ilog2() as usize]
+            .get_or_init(|| Self::on(DeviceConfig { lanes: Some(lanes), ..DeviceConfig::pocl() }))
     }
 
     /// A study's bench on its service.
@@ -120,12 +128,12 @@ impl House {
             spacing: Some(dims.map(|n| (2.0 / n as f64).to_string()).join(",")),
             endian: None,
         };
-        let (_, id, _) = self.store().insert(bytes, "test", query.parse().unwrap()).unwrap();
+        let (_, id, _) = self.assets().volumes().insert(bytes, "test", query.parse().unwrap()).unwrap();
         json!({"id": id})
     }
 
     /// Puts a volume file in the store and returns what goes under `volume`.
     pub fn file(&self, bytes: Vec<u8>) -> Value {
-        json!({"id": self.store().insert(bytes, "file", None).unwrap().1})
+        json!({"id": self.assets().volumes().insert(bytes, "file", None).unwrap().1})
     }
 }

@@ -35,6 +35,12 @@ pub fn kernel_cache() -> PathBuf {
         .map_or_else(|| PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("kernels"), PathBuf::from)
 }
 
+/// Has PoCL in this process keep what it compiles there. Once, since it changes the environment.
+pub fn keep_kernels() {
+    static ONCE: std::sync::Once = std::sync::Once::new();
+    ONCE.call_once(|| cloudchamber::device::keep_compiled_kernels_in(&kernel_cache()).unwrap());
+}
+
 /// Says what a test that passes did not do: the macros that print would be silenced.
 pub fn say(words: &str) {
     use std::io::Write;

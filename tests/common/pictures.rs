@@ -173,6 +173,6 @@ pub fn with_ids(request: &Value, id: &dyn Fn(&str) -> String) -> Value {
 pub fn with_volumes(request: &Value, house: &House) -> Value {
     with_ids(request, &|name| {
         let (bytes, query) = upload(name);
-        house.store().insert(bytes, name, query.parse().unwrap()).unwrap().1
+        house.assets().volumes().insert(bytes, name, query.parse().unwrap()).unwrap().1
     })
 }

@@ -12,12 +12,10 @@ mod structs;
 
 use std::path::Path;
 
-use cloudchamber::device::{self, Device, DeviceConfig};
+use cloudchamber::device::{Device, DeviceConfig};
 
 fn open(lanes: Option<u32>, kernels: Option<&Path>) -> Device {
-    static ONCE: Mutex<()> = Mutex::new(());
-    let _one_at_a_time = ONCE.lock();
-    device::keep_compiled_kernels_in(&crate::common::kernel_cache()).unwrap();
+    crate::common::keep_kernels();
     Device::open(&DeviceConfig { lanes, kernels: kernels.map(Path::to_owned), strict: true, ..DeviceConfig::pocl() })
         .unwrap()
 }

@@ -7,12 +7,12 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use cloudchamber::device::DeviceConfig;
-use cloudchamber::render::{self, Subject};
-use cloudchamber::technique;
-use crate::common::engine::House;
+use crate::common::engine::{House, kernels_of};
 use crate::common::picture::{Picture, check_comparison};
 use crate::common::pictures::{self, Asked};
+use cloudchamber::device::DeviceConfig;
+use cloudchamber::render;
+use cloudchamber::technique;
 use serde_json::{Value, json};
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/pictures");
@@ -131,10 +131,7 @@ fn all_techniques_voxel_types_and_features_are_in_the_list() {
     for asked in &list {
         let request = pictures::with_volumes(&asked.request, house);
         let scene = house.scene(&request).unwrap_or_else(|e| panic!("{}: {e}", asked.name));
-        let variant = match scene.subject() {
-            Subject::Volume(volume) => scene.view().plan(volume).unwrap().variant,
-            Subject::Field(field, ..) => field.kernels().unwrap()[0],
-        };
+        let variant = kernels_of(&scene)[0];
         met.extend(variant.voxel.map(|v| (variant.kernel, "voxel", format!("{v:?}"))));
         met.extend(variant.features.iter().map(|(name, value)| (variant.kernel, *name, value.to_string())));
     }

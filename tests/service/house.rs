@@ -51,7 +51,7 @@ fn opencl_and_unsafe_live_in_device_only() {
 }
 
 /// The way of the data, the left first: a module uses only those behind it. Modules in brackets do not use each other.
-const ORDER: [&[&str]; 17] = [
+const ORDER: [&[&str]; 18] = [
     &["command"],
     &["http"],
     &["study"],
@@ -67,6 +67,7 @@ const ORDER: [&[&str]; 17] = [
     &["device"],
     &["film"],
     &["frame", "power_law"],
+    &["asset"],
     &["volume"],
     &["error"],
 ];
@@ -139,9 +140,11 @@ fn every_form_of_a_use_is_seen() {
 #[test]
 fn every_technique_has_its_three_files() {
     for t in cloudchamber::technique::ALL {
-        for file in
-            [format!("src/technique/{}.rs", t.name), format!("kernels/{}.cl", t.name), format!("tests/physics/{}.rs", t.name)]
-        {
+        for file in [
+            format!("src/technique/{}.rs", t.name),
+            format!("kernels/{}.cl", t.name),
+            format!("tests/physics/{}.rs", t.name),
+        ] {
             assert!(root().join(&file).is_file(), "{file} is missing");
         }
     }

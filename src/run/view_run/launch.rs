@@ -40,19 +40,20 @@ impl ViewRun {
             self.resume.before(device, items)?;
         }
         let layer = self.gathered.layer(pass);
-        let cells = match &self.distances {
-            Some(distances) => ("distances", &**distances),
-            None => ("ranges", &self.volume.cells.ranges),
-        };
         let mut arguments = vec![
             ("view", &self.view_buffer),
             ("params", &self.parameters),
-            ("voxels", &self.volume.voxels),
-            cells,
             ("table", &*layer.table),
             ("film", &layer.buffer),
             ("counts", &self.gathered.counts),
         ];
+        if let Some(volume) = &self.volume {
+            arguments.push(("voxels", &volume.voxels));
+            arguments.push(match &self.distances {
+                Some(distances) => ("distances", &**distances),
+                None => ("ranges", &volume.cells.ranges),
+            });
+        }
         arguments.extend(layer.tiles().map(|tiles| ("tiles", tiles)));
         arguments.extend((self.plan.state_words > 0).then(|| ("state", self.resume.state())));
         let took = device.run(&self.plan.variant, &arguments, items)?;

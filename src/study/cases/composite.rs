@@ -43,10 +43,10 @@ fn trial(bench: &Bench, scale: Scale) -> Result<std::result::Result<Trial, Strin
     let Ok(bytes) = std::fs::read(&path) else {
         return Ok(Err(format!("needs {}, of Debian's mricron-data", path.display())));
     };
-    let id = bench.store().insert(bytes, "head", None)?.1;
-    let volume = bench.store().get(&id)?;
+    let id = bench.assets().volumes().insert(bytes, "head", None)?.1;
+    let volume = bench.assets().volumes().get(&id)?;
     let grid = Grid::of_volume(&volume);
-    let voxel = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
+    let voxel = volume.smallest_side();
     let eye = Eye { eye: DVec3::new(300.0, 190.0, 140.0), wide: 240.0 };
     let truth = reference(&grid, eye, voxel / STEPS_PER_VOXEL);
     let points: Vec<Value> = POINTS

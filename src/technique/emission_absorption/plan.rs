@@ -5,6 +5,7 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 
 use super::pieces::pieces;
+use super::regions::Region;
 use super::{EmissionAbsorption, Parameters, TECHNIQUE, regions};
 use crate::device::Resume;
 use crate::device::program::{Source, Variant, each_voxel_type, listed};
@@ -16,7 +17,8 @@ use crate::scene::presets;
 use crate::scene::transfer::{TABLE_SIZE, TransferFunction, pack};
 use crate::technique::stepping::{Way, stepping};
 use crate::technique::steps::coarse_step;
-use crate::technique::{CellUse, Open, Settings, View, ViewPlan, view_words};
+use crate::technique::view::in_words;
+use crate::technique::{CellUse, Open, PreparedView, Settings, Subject, View, ViewPlan, view_words};
 use crate::volume::{Volume, VoxelType};
 
 /// Words of a lane that a launch leaves to the next: a packet's radiance and transmittance.
@@ -114,116 +116,163 @@ impl Parameters {
     }
 }
 
-impl View for Parameters {
-    fn warnings(&self, _: &Volume) -> Vec<Value> {
-        coarse_step(self.step_voxels).into_iter().collect()
-    }
+/// What colours a sample.
+enum Colours {
+    /// A transfer function of the value.
+    Function(TransferFunction),
+    /// Regions of value and gradient.
+    Regions(Vec<Region>),
+}
 
-    fn settings(&self, volume: &Volume, open: &Open<'_>) -> Option<Settings> {
-        let mut ways = vec![Way::as_given(self)];
-        if open.leaves("pre_integrated") {
-            let integrated = Self { pre_integrated: true, ..self.clone() };
-            let possible = integrated.check_together("").is_ok();
-            let change = Some(("pre_integrated", json!(true)));
-            ways.extend(possible.then_some(Way { words: ", pre-integrated", change, parameters: integrated }));
-        }
-        // There is no gradient for shading to show.
-        let flat = volume.non_finite() == 0 && volume.range()[0] == volume.range()[1];
-        if flat && self.shading {
-            let unshaded = Self { shading: false, ..self.clone() };
-            ways.push(Way { words: ", unshaded", change: Some(("shading", json!(false))), parameters: unshaded });
-        }
-        stepping(TECHNIQUE.name, open, &ways, |p, step| Arc::new(Self { step_voxels: step, ..p.clone() }))
-    }
+/// The view of a volume.
+struct Prepared {
+    parameters: Parameters,
+    volume: Arc<Volume>,
+    colours: Colours,
+    /// [`PreparedView::steepest_slope`] is of the volume's own values, not of words.
+    function_of_values: Option<TransferFunction>,
+    plan: ViewPlan,
+}
 
-    fn steepest_slope(&self, volume: &Volume) -> Option<f64> {
-        let plain = self.regions.is_none() && !self.labels();
-        let function = plain.then(|| self.transfer_function(volume).ok()).flatten();
-        function.map(|(function, _)| self.opacity_scale * function.steepest_slope())
-    }
-
-    fn shows_labels(&self) -> bool {
-        self.labels()
-    }
-
+impl Parameters {
     /// Half an entry of the table. The plain reference form, and what is of another order or style, take values as they are.
-    fn resolution(&self, volume: &Volume) -> Result<Option<f64>> {
+    fn resolution(&self, function: &TransferFunction) -> Result<Option<f64>> {
         let plain = [plain(Interpolation::Trilinear, false), plain(Interpolation::Trilinear, true)];
-        if !plain.contains(self.features()?) {
-            return Ok(None);
-        }
-        let [low, high] = self.transfer_function(volume)?.0.domain();
-        Ok(Some(0.5 * (high - low) / TABLE_SIZE as f64))
+        let [low, high] = function.domain();
+        Ok(plain.contains(self.features()?).then_some(0.5 * (high - low) / TABLE_SIZE as f64))
     }
 
-    fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
+    /// The plan for a volume, whose values in `opaque` are not transparent; `named` says what colours it.
+    fn plan(&self, volume: &Volume, opaque: Vec<[f64; 2]>, named: String) -> Result<ViewPlan> {
         let skip = self.empty_space_skipping && self.order == "front_to_back";
-        let (opaque, named) = match &self.regions {
-            Some(regions) => (regions::opaque(regions), format!("{} regions of value and gradient", regions.len())),
-            None => {
-                let (function, named) = self.transfer_function(volume)?;
-                (function.opaque(), format!("transfer function: {named}"))
-            }
-        };
         let mut reasons = vec![named];
         if !skip {
             reasons.push("every sample is taken: skipping is off".into());
         }
-        let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
         Ok(ViewPlan {
             variant: Variant::new(TECHNIQUE.name, Some(volume.voxel_type()), self.features()?),
             cells: if skip { CellUse::Distances(opaque) } else { CellUse::None },
-            step: (self.step_voxels * smallest) as f32,
+            step: (self.step_voxels * volume.smallest_side()) as f32,
             state_words: STATE_WORDS,
             stepless: false,
             opacity_threshold: self.threshold(),
             reasons,
         })
     }
+}
 
-    fn parameters(&self, volume: &Volume, _camera: &Camera) -> Result<Vec<u8>> {
-        let threshold = self.threshold();
+impl View for Parameters {
+    fn prepare(&self, subject: &Subject) -> Result<Arc<dyn PreparedView>> {
+        let parameters = self.clone();
+        let volume = subject.needed_volume()?;
+        if let Some(regions) = &self.regions {
+            let named = format!("{} regions of value and gradient", regions.len());
+            let plan = self.plan(volume, regions::opaque(regions), named)?;
+            let colours = Colours::Regions(regions.clone());
+            return Ok(Arc::new(Prepared {
+                parameters,
+                volume: volume.clone(),
+                colours,
+                function_of_values: None,
+                plan,
+            }));
+        }
+        let (of_values, mut named) = self.transfer_function(volume)?;
+        let (looked_at, words) = in_words(volume, self.resolution(&of_values)?);
+        let mut function = of_values.clone();
+        if words.is_some() {
+            (function, named) = self.transfer_function(&looked_at)?;
+        }
+        let mut plan = self.plan(&looked_at, function.opaque(), format!("transfer function: {named}"))?;
+        plan.reasons.extend(words);
+        let function_of_values = (!self.labels()).then_some(of_values);
+        let colours = Colours::Function(function);
+        Ok(Arc::new(Prepared { parameters, volume: looked_at, colours, function_of_values, plan }))
+    }
+
+    fn shows_labels(&self) -> bool {
+        self.labels()
+    }
+}
+
+impl PreparedView for Prepared {
+    fn plan(&self) -> &ViewPlan {
+        &self.plan
+    }
+
+    fn volume(&self) -> Option<&Arc<Volume>> {
+        Some(&self.volume)
+    }
+
+    fn warnings(&self) -> Vec<Value> {
+        coarse_step(self.parameters.step_voxels).into_iter().collect()
+    }
+
+    fn settings(&self, open: &Open<'_>) -> Option<Settings> {
+        let given = &self.parameters;
+        let mut ways = vec![Way::as_given(given)];
+        if open.leaves("pre_integrated") {
+            let integrated = Parameters { pre_integrated: true, ..given.clone() };
+            let possible = integrated.check_together("").is_ok();
+            let change = Some(("pre_integrated", json!(true)));
+            ways.extend(possible.then_some(Way { words: ", pre-integrated", change, parameters: integrated }));
+        }
+        // There is no gradient for shading to show.
+        let flat = self.volume.non_finite() == 0 && self.volume.range()[0] == self.volume.range()[1];
+        if flat && given.shading {
+            let unshaded = Parameters { shading: false, ..given.clone() };
+            ways.push(Way { words: ", unshaded", change: Some(("shading", json!(false))), parameters: unshaded });
+        }
+        stepping(TECHNIQUE.name, open, &ways, |p, step| Arc::new(Parameters { step_voxels: step, ..p.clone() }))
+    }
+
+    fn steepest_slope(&self) -> Option<f64> {
+        let function = self.function_of_values.as_ref()?;
+        Some(self.parameters.opacity_scale * function.steepest_slope())
+    }
+
+    fn parameters(&self, _camera: &Camera) -> Vec<u8> {
+        let (own, volume) = (&self.parameters, &self.volume);
+        let threshold = own.threshold();
         let mut device = EmissionAbsorption {
             transmittance_floor: if threshold >= 1.0 { 0.0 } else { (1.0 - threshold) as f32 },
-            brightness: (self.brightness * self.cuda_sample.as_ref().map_or(1.0, |c| c.brightness)) as f32,
-            lit: i32::from(self.shading),
+            brightness: (own.brightness * own.cuda_sample.as_ref().map_or(1.0, |c| c.brightness)) as f32,
+            lit: i32::from(own.shading),
             ..EmissionAbsorption::default()
         };
-        let ([low, high], entries) = match &self.regions {
-            Some(regions) => {
+        let ([low, high], entries) = match &self.colours {
+            Colours::Regions(regions) => {
                 let (values, steep) = regions::extent(regions, volume);
                 device.gradient_scale = (volume.slope().abs() * 255.0 / steep) as f32;
                 (values, 256)
             }
-            None => (self.transfer_function(volume)?.0.domain(), TABLE_SIZE),
+            Colours::Function(function) => (function.domain(), TABLE_SIZE),
         };
         let per_value = (entries - 1) as f64 / (high - low);
         device.table_scale = (volume.slope() * per_value) as f32;
         // Half an entry, so that a value goes to the nearest.
         device.table_offset = ((volume.inter() - low) * per_value + 0.5) as f32;
-        self.styles().apply(volume, &mut device);
-        Ok(bytemuck::bytes_of(&device).to_vec())
+        own.styles().apply(volume, &mut device);
+        bytemuck::bytes_of(&device).to_vec()
     }
 
-    fn table(&self, volume: &Volume, step: f32) -> Result<Vec<u32>> {
-        let step = f64::from(step);
-        if let Some(regions) = &self.regions {
-            return Ok(regions::table(regions, volume, self.opacity_scale, step));
+    fn table(&self, step: f32) -> Vec<u32> {
+        let (own, step) = (&self.parameters, f64::from(step));
+        match &self.colours {
+            Colours::Regions(regions) => regions::table(regions, &self.volume, own.opacity_scale, step),
+            Colours::Function(function) if own.pre_integrated => function.integrals(own.opacity_scale),
+            Colours::Function(function) => {
+                let entries = function.entries(own.opacity_scale, step);
+                entries.iter().flat_map(|&(color, opacity)| pack(color, opacity)).chain(pieces(&entries)).collect()
+            }
         }
-        let (function, _) = self.transfer_function(volume)?;
-        Ok(if self.pre_integrated {
-            function.integrals(self.opacity_scale)
-        } else {
-            let entries = function.entries(self.opacity_scale, step);
-            entries.iter().flat_map(|&(color, opacity)| pack(color, opacity)).chain(pieces(&entries)).collect()
-        })
     }
 
     fn set_shared(&self, camera: &Camera, view: &mut DeviceView) {
-        if !self.jitter {
+        if !self.parameters.jitter {
             (view.jittered, view.place) = (0, 0.5);
         }
-        self.light.clone().unwrap_or_default().apply(camera, view);
+        self.parameters.light.clone().unwrap_or_default().apply(camera, view);
     }
 }
 

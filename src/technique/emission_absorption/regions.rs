@@ -78,7 +78,7 @@ pub fn extent(regions: &[Region], volume: &Volume) -> ([f64; 2], f64) {
     let steep = regions.iter().map(|r| r.gradient[1]).fold(0.0, f64::max);
     // A little more at each end, so that the outermost entries, which stand for all beyond, are empty.
     let margin = (high - low).max(1e-12) / (SIDE - 4) as f64;
-    let voxel = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
+    let voxel = volume.smallest_side();
     let [least, most] = volume.range();
     // No gradient is steeper than the whole range from a voxel to the next, along all three axes.
     let possible = 1.75 * (most - least).max(1e-12) / voxel;

@@ -134,7 +134,7 @@ impl Styles<'_> {
 
     /// Tells the device. Gradients are in raw values there.
     pub fn apply(&self, volume: &Volume, device: &mut EmissionAbsorption) {
-        let voxel = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
+        let voxel = volume.smallest_side();
         let narrow = |c: [f64; 3]| c.map(|v| v as f32);
         if let Some(g) = self.gradient_opacity {
             let [low, high] = volume.range();

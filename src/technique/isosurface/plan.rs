@@ -11,12 +11,13 @@ use crate::device::program::{Source, Variant, each_voxel_type, listed};
 use crate::device::structs::{DeviceStruct, View as DeviceView};
 use crate::error::Result;
 use crate::scene;
+use crate::scene::bounds::Bounds;
 use crate::scene::camera::Camera;
 use crate::scene::interpolation::Interpolation;
 use crate::scene::light::LightRequest;
 use crate::technique::stepping::{Way, stepping};
 use crate::technique::steps::coarse_step;
-use crate::technique::{CellUse, Open, Settings, View, ViewPlan, view_words};
+use crate::technique::{CellUse, Open, PreparedView, Settings, Subject, View, ViewPlan, view_words};
 use crate::volume::{Volume, VoxelType};
 
 /// Words of a lane that a launch leaves to the next: a packet's search.
@@ -95,23 +96,28 @@ impl Parameters {
     }
 }
 
-impl View for Parameters {
-    fn settings(&self, _: &Volume, open: &Open<'_>) -> Option<Settings> {
-        let ways = [Way::as_given(self)];
-        stepping(TECHNIQUE.name, open, &ways, |p, step| Arc::new(Self { step_voxels: step, ..p.clone() }))
-    }
+/// Surfaces of a volume.
+struct Prepared {
+    parameters: Parameters,
+    volume: Arc<Volume>,
+    /// By ascending raw value.
+    surfaces: Vec<Surface>,
+    plan: ViewPlan,
+}
 
-    fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
-        let surfaces = self.surfaces(volume);
+impl View for Parameters {
+    fn prepare(&self, subject: &Subject) -> Result<Arc<dyn PreparedView>> {
+        let volume = subject.needed_volume()?.clone();
+        let surfaces = self.surfaces(&volume);
         let wanted = features(self.interpolation(), self.layered(&surfaces));
         let features = permitted(wanted)?;
-        let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
+        let smallest = volume.smallest_side();
         let values: Vec<String> = surfaces.iter().map(|s| format!("{:.4}", s.isovalue)).collect();
         let mut reasons = vec![format!("isovalues: {}", values.join(", "))];
         if !self.empty_space_skipping {
             reasons.push("every sample is taken: skipping is off".into());
         }
-        Ok(ViewPlan {
+        let plan = ViewPlan {
             variant: Variant::new(TECHNIQUE.name, Some(volume.voxel_type()), features),
             cells: if self.empty_space_skipping { CellUse::Distances(self.wanted(&surfaces)) } else { CellUse::None },
             step: (self.step_voxels * smallest) as f32,
@@ -119,20 +125,36 @@ impl View for Parameters {
             stepless: false,
             opacity_threshold: if self.layered(&surfaces) { OPACITY_THRESHOLD } else { 1.0 },
             reasons,
-        })
+        };
+        Ok(Arc::new(Prepared { parameters: self.clone(), volume, surfaces, plan }))
+    }
+}
+
+impl PreparedView for Prepared {
+    fn plan(&self) -> &ViewPlan {
+        &self.plan
     }
 
-    fn parameters(&self, volume: &Volume, _camera: &Camera) -> Result<Vec<u8>> {
-        let surfaces = self.surfaces(volume);
-        let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
-        let occlusion = self.ambient_occlusion.as_ref();
+    fn volume(&self) -> Option<&Arc<Volume>> {
+        Some(&self.volume)
+    }
+
+    fn settings(&self, open: &Open<'_>) -> Option<Settings> {
+        let ways = [Way::as_given(&self.parameters)];
+        stepping(TECHNIQUE.name, open, &ways, |p, step| Arc::new(Parameters { step_voxels: step, ..p.clone() }))
+    }
+
+    fn parameters(&self, _camera: &Camera) -> Vec<u8> {
+        let (own, volume, surfaces) = (&self.parameters, &self.volume, &self.surfaces);
+        let (smallest, radius) = (volume.smallest_side(), Bounds::from(&**volume).radius());
+        let occlusion = own.ambient_occlusion.as_ref();
         let mut device = Isosurface {
             sign: volume.slope().signum() as f32,
             surfaces: surfaces.len() as i32,
             transmittance_floor: (1.0 - OPACITY_THRESHOLD) as f32,
-            tolerance: (TOLERANCE_VOXELS * smallest).max(TOLERANCE_OF_WAY * scene::radius(volume)) as f32,
-            analytic: i32::from(self.normals == Normals::Analytic),
-            depth: i32::from(self.output == Output::Depth),
+            tolerance: (TOLERANCE_VOXELS * smallest).max(TOLERANCE_OF_WAY * radius) as f32,
+            analytic: i32::from(own.normals == Normals::Analytic),
+            depth: i32::from(own.output == Output::Depth),
             occlusion_rays: occlusion.map_or(0, |o| o.rays as i32),
             occlusion_radius: occlusion.and_then(|o| o.radius).unwrap_or(0.1 * scene::mean_side(volume)) as f32,
             occlusion_start: (0.5 * smallest) as f32,
@@ -141,29 +163,29 @@ impl View for Parameters {
         for (i, surface) in surfaces.iter().enumerate() {
             device.isovalue[i] = ((surface.isovalue - volume.inter()) / volume.slope()) as f32;
             device.color[3 * i..3 * i + 3].copy_from_slice(&surface.color.map(|c| c as f32));
-            device.opacity[i] = if self.output == Output::Depth { 1.0 } else { surface.opacity as f32 };
+            device.opacity[i] = if own.output == Output::Depth { 1.0 } else { surface.opacity as f32 };
         }
-        Ok(bytemuck::bytes_of(&device).to_vec())
+        bytemuck::bytes_of(&device).to_vec()
     }
 
     fn set_shared(&self, camera: &Camera, view: &mut DeviceView) {
         // Surfaces are looked for from one end of a step to the other, not at a place within it.
         (view.jittered, view.place) = (0, 0.0);
-        let shadowed = self.ambient_occlusion.is_some();
-        let light =
-            self.light.clone().unwrap_or(if shadowed { LightRequest::diffuse_sky() } else { Default::default() });
-        light.apply(camera, view);
+        let shadowed = self.parameters.ambient_occlusion.is_some();
+        let default = || if shadowed { LightRequest::diffuse_sky() } else { Default::default() };
+        self.parameters.light.clone().unwrap_or_else(default).apply(camera, view);
     }
 
-    fn warnings(&self, volume: &Volume) -> Vec<Value> {
-        let [low, high] = volume.range();
+    fn warnings(&self) -> Vec<Value> {
+        let [low, high] = self.volume.range();
         let outside = |s: &&Surface| !(low..=high).contains(&s.isovalue);
         let warning = |s: &Surface| {
             let message =
                 format!("no voxel is on the other side of {}: the values go from {low} to {high}", s.isovalue);
             json!({"code": "isovalue_outside_range", "message": message, "measured": s.isovalue, "bound": [low, high]})
         };
-        self.surfaces(volume).iter().filter(outside).map(warning).chain(coarse_step(self.step_voxels)).collect()
+        let too_long = coarse_step(self.parameters.step_voxels);
+        self.surfaces.iter().filter(outside).map(warning).chain(too_long).collect()
     }
 }
 

@@ -8,9 +8,10 @@ use super::clearance::clearances;
 use super::layers::{self, Layer};
 use super::medium::Medium;
 use super::parameters::Parameters;
+use crate::asset::Assets;
 use crate::error::{Error, Result};
 use crate::scene::phase::Phase;
-use crate::volume::{Store, Volume, builtin};
+use crate::volume::{Volume, builtin};
 
 /// The place of each medium.
 #[derive(Debug, Clone)]
@@ -50,7 +51,7 @@ impl Geometry {
     ///
     /// # Errors
     /// More than one kind of it, layers without end before the last, labels without a medium, densities below 0.
-    pub fn new(p: &Parameters, store: &Store, at: &str) -> Result<Self> {
+    pub fn new(p: &Parameters, assets: &Assets, at: &str) -> Result<Self> {
         let given = [("media", p.media.is_some()), ("layers", p.layers.is_some()), ("medium", p.medium.is_some())];
         if given.iter().filter(|g| g.1).count() > 1 {
             let names: Vec<&str> = given.iter().filter(|g| g.1).map(|g| g.0).collect();
@@ -82,9 +83,9 @@ impl Geometry {
         let geometry = if let Some(layers) = &p.layers {
             Self::layers(p, layers, at)
         } else if let (Some(labels), Some(media)) = (&p.labels, &p.media) {
-            Self::labels(p, &*labels.volume(store, &format!("{at}/labels"))?, media, at)
+            Self::labels(p, &*labels.volume(assets, &format!("{at}/labels"))?, media, at)
         } else if let Some(density) = &p.density {
-            Self::density(p, &*density.volume(store, &format!("{at}/density"))?, at)
+            Self::density(p, &*density.volume(assets, &format!("{at}/density"))?, at)
         } else if let Some(medium) = &p.medium {
             let size_mm = p.size_mm.unwrap_or([60.0; 3]);
             Ok(Self { place: Where::Box, media: vec![medium.clone()], size_mm, dims: p.dims([60; 3]), chamber: false })

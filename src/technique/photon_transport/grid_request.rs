@@ -5,8 +5,9 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use crate::asset::Assets;
 use crate::error::{Error, Result};
-use crate::volume::{Store, Volume, builtin};
+use crate::volume::{Volume, builtin};
 
 /// A volume whose voxels say what is where.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -29,11 +30,11 @@ impl GridRequest {
     ///
     /// # Errors
     /// [`Error::Invalid`] with a pointer under `at`.
-    pub fn volume(&self, store: &Store, at: &str) -> Result<Arc<Volume>> {
+    pub fn volume(&self, assets: &Assets, at: &str) -> Result<Arc<Volume>> {
         match (&self.id, &self.builtin) {
-            (Some(id), None) => store.named(id, &format!("{at}/id")),
+            (Some(id), None) => assets.volumes().named(id, &format!("{at}/id")),
             (None, Some(name)) if builtin::NAMES.contains(&name.as_str()) => {
-                store.builtin(name, self.resolution.unwrap_or(64) as usize, self.seed.unwrap_or(0))
+                assets.builtin(name, self.resolution.unwrap_or(64) as usize, self.seed.unwrap_or(0))
             }
             (None, Some(name)) => {
                 let permitted = builtin::NAMES.join(", ");

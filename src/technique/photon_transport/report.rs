@@ -131,16 +131,17 @@ mod tests {
 
     use super::super::simulation;
     use super::*;
-    use crate::volume::{Store, StoreLimits, VolumeLimits};
+    use crate::asset::{AssetLimits, Assets};
+    use crate::volume::VolumeLimits;
 
     #[test]
     fn sums_near_the_end_of_their_range_are_flagged() -> crate::error::Result<()> {
         let folder = std::env::temp_dir().join(format!("cloudchamber-report-{}", std::process::id()));
-        let store = Store::open(
+        let assets = Assets::open(
             &folder,
-            StoreLimits { volume: VolumeLimits::default(), max_store_bytes: 0, max_resident_bytes: 0 },
+            AssetLimits { volume: VolumeLimits::default(), max_store_bytes: 0, max_resident_bytes: 0 },
         )?;
-        let of = simulation(&json!({"photons": 1000, "grid": [4, 4, 4]}), "/volume/photon_transport", &store)?;
+        let of = simulation(&json!({"photons": 1000, "grid": [4, 4, 4]}), "/volume/photon_transport", &assets)?;
         let plan = of.device_plan()?;
         let flags = |grid_sum: u64, ledger_sum: u64| {
             let (mut grid, mut ledger) = (vec![0; plan.cells], vec![0; plan.ledger]);

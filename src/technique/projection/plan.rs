@@ -17,7 +17,8 @@ use crate::scene::presets::is_hounsfield;
 use crate::scene::window::{Output, Window};
 use crate::technique::stepping::{Way, stepping};
 use crate::technique::steps::coarse_step;
-use crate::technique::{CellUse, Open, Settings, View, ViewPlan, view_words};
+use crate::technique::view::in_words;
+use crate::technique::{CellUse, Open, PreparedView, Settings, Subject, View, ViewPlan, view_words};
 use crate::volume::{Volume, VoxelType};
 
 /// Words of a lane that a launch leaves to the next: a packet's best value.
@@ -107,28 +108,27 @@ impl Parameters {
     }
 }
 
-impl View for Parameters {
-    fn settings(&self, _: &Volume, open: &Open<'_>) -> Option<Settings> {
-        let ways = [Way::as_given(self)];
-        stepping(TECHNIQUE.name, open, &ways, |p, step| Arc::new(Self { step_voxels: step, ..p.clone() }))
-    }
+/// A projection of a volume.
+struct Prepared {
+    parameters: Parameters,
+    volume: Arc<Volume>,
+    window: Window,
+    plan: ViewPlan,
+}
 
-    fn warnings(&self, _: &Volume) -> Vec<Value> {
-        coarse_step(self.step_voxels).filter(|_| !self.walked()).into_iter().collect()
-    }
-
+impl Parameters {
     /// Half an entry of the table of colours, where samples are taken and not written to the film as they are.
-    fn resolution(&self, volume: &Volume) -> Result<Option<f64>> {
+    fn resolution(&self, window: &Window) -> Option<f64> {
         let plain = !self.walked() && self.interpolation() == Interpolation::Trilinear && self.output != Output::Value;
-        let [per_value, _] = self.window(volume)?.scale_and_offset();
-        Ok(plain.then(|| 0.5 / f64::from(per_value).abs()))
+        let [per_value, _] = window.scale_and_offset();
+        plain.then(|| 0.5 / f64::from(per_value).abs())
     }
 
-    fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
+    fn plan(&self, volume: &Volume, window: &Window) -> Result<ViewPlan> {
         let wanted = features(self.interpolation(), self.walked());
         let features = permitted(wanted)?;
-        let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
-        let mut reasons = vec![format!("window: {}", self.window(volume)?)];
+        let smallest = volume.smallest_side();
+        let mut reasons = vec![format!("window: {window}")];
         reasons.push(match (self.walked(), self.empty_space_skipping) {
             (true, _) => "exact for the interpolant: the step plays no part".into(),
             (_, true) => "what cannot show more than was seen is left out".into(),
@@ -149,10 +149,11 @@ impl View for Parameters {
         })
     }
 
-    fn parameters(&self, volume: &Volume, _camera: &Camera) -> Result<Vec<u8>> {
-        let [window_scale, window_offset] = self.window(volume)?.scale_and_offset();
+    /// The device's parameters for a volume.
+    fn on_device(&self, volume: &Volume, window: &Window) -> Projection {
+        let [window_scale, window_offset] = window.scale_and_offset();
         let wanted = if self.mode == Mode::Minimum { -1.0 } else { 1.0 };
-        let device = Projection {
+        Projection {
             mode: self.mode.on_device().code(),
             sign: (wanted * volume.slope().signum()) as f32,
             slope: volume.slope() as f32,
@@ -163,12 +164,46 @@ impl View for Parameters {
             window_offset,
             raw_values: i32::from(self.output == Output::Value),
             skipping: i32::from(self.empty_space_skipping),
-        };
-        Ok(bytemuck::bytes_of(&device).to_vec())
+        }
+    }
+}
+
+impl View for Parameters {
+    fn prepare(&self, subject: &Subject) -> Result<Arc<dyn PreparedView>> {
+        let volume = subject.needed_volume()?;
+        let (volume, words) = in_words(volume, self.resolution(&self.window(volume)?));
+        let window = self.window(&volume)?;
+        let mut plan = self.plan(&volume, &window)?;
+        plan.reasons.extend(words);
+        Ok(Arc::new(Prepared { parameters: self.clone(), volume, window, plan }))
+    }
+}
+
+impl PreparedView for Prepared {
+    fn plan(&self) -> &ViewPlan {
+        &self.plan
     }
 
-    fn table(&self, _volume: &Volume, _step: f32) -> Result<Vec<u32>> {
-        Ok(self.color_map.table(self.invert))
+    fn volume(&self) -> Option<&Arc<Volume>> {
+        Some(&self.volume)
+    }
+
+    fn settings(&self, open: &Open<'_>) -> Option<Settings> {
+        let ways = [Way::as_given(&self.parameters)];
+        stepping(TECHNIQUE.name, open, &ways, |p, step| Arc::new(Parameters { step_voxels: step, ..p.clone() }))
+    }
+
+    fn warnings(&self) -> Vec<Value> {
+        let walked = self.parameters.walked();
+        coarse_step(self.parameters.step_voxels).filter(|_| !walked).into_iter().collect()
+    }
+
+    fn parameters(&self, _camera: &Camera) -> Vec<u8> {
+        bytemuck::bytes_of(&self.parameters.on_device(&self.volume, &self.window)).to_vec()
+    }
+
+    fn table(&self, _step: f32) -> Vec<u32> {
+        self.parameters.color_map.table(self.parameters.invert)
     }
 
     fn set_shared(&self, _camera: &Camera, view: &mut DeviceView) {

@@ -1,5 +1,7 @@
 //! The plan of scattering views: their kernel, parameters and tables.
 
+use std::sync::Arc;
+
 use serde_json::{Value, json};
 
 use super::device::{Density, Scattering};
@@ -9,14 +11,15 @@ use crate::device::cells::CELL;
 use crate::device::program::Variant;
 use crate::error::{Error, Result};
 use crate::scene;
-use crate::scene::camera::{Camera, Framing};
+use crate::scene::bounds::Bounds;
+use crate::scene::camera::Camera;
 use crate::scene::depth::greatest_along_axes;
 use crate::scene::interpolation::Interpolation;
 use crate::scene::lights::Lights;
 use crate::technique::majorant::{Tracking, march_bias};
 use crate::technique::optics::Optics;
 use crate::technique::slab::missing;
-use crate::technique::{CellUse, Open, Random, Settings, View, ViewPlan};
+use crate::technique::{CellUse, Open, PreparedView, Random, Settings, Subject, View, ViewPlan};
 use crate::volume::Volume;
 
 /// Steps of less than this part of a volume's voxels along an axis are lost in single precision.
@@ -28,6 +31,7 @@ const MEAN_OF: usize = 4096;
 const SCATTERINGS_MISSING: f64 = 0.01;
 
 /// A scattering view with valid parameters.
+#[derive(Clone)]
 pub(in crate::technique) struct Scatterer {
     pub(super) kernel: &'static str,
     pub(super) parameters: Parameters,
@@ -101,16 +105,12 @@ impl Scatterer {
     fn check_march(&self, volume: &Volume) -> Result<()> {
         let largest = volume.spacing().into_iter().fold(0.0, f64::max);
         let most = volume.dims().into_iter().max().unwrap_or(1) as f64;
-        let least = most * LOST * largest / Self::smallest_voxel(volume);
+        let least = most * LOST * largest / volume.smallest_side();
         if self.parameters.tracking != Asked::March || self.parameters.march_step_voxels >= least {
             return Ok(());
         }
         let at = format!("/{}/march_step_voxels", self.kernel);
         Err(Error::invalid(at, "too short for voxels of so different sides", format!("at least {least:.3}")))
-    }
-
-    fn smallest_voxel(volume: &Volume) -> f64 {
-        volume.spacing().into_iter().fold(f64::INFINITY, f64::min)
     }
 
     /// The mean density of a few thousand voxels.
@@ -154,84 +154,26 @@ impl Scatterer {
         let [zenith, horizon, ground] = sky.radiance.map(|c| c.map(|v| v as f32));
         (device.sky_zenith, device.sky_horizon, device.sky_ground) = (zenith, horizon, ground);
         (device.sky, device.sky_visible) = (1, i32::from(sky.visible));
-        device.sky_up = sky.up.unwrap_or_else(|| Framing::from(volume).up()).as_vec3().to_array();
+        device.sky_up = sky.up.unwrap_or_else(|| Bounds::from(volume).up()).as_vec3().to_array();
     }
 }
 
 impl View for Scatterer {
-    fn settings(&self, volume: &Volume, open: &Open<'_>) -> Option<Settings> {
-        Some(self.settings_of(volume, open))
-    }
-
-    fn optics(&self, volume: &Volume) -> Option<Optics> {
-        Some(self.optics_of(volume))
-    }
-
-    fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
-        self.check_march(volume)?;
-        let (features, why) = self.features(volume)?;
-        let variant = Variant::new(self.kernel, Some(volume.voxel_type()), features);
-        let sigma = self.parameters.medium.sigma_t_per_unit(volume);
-        Ok(ViewPlan {
-            variant,
+    fn prepare(&self, subject: &Subject) -> Result<Arc<dyn PreparedView>> {
+        let volume = subject.needed_volume()?.clone();
+        self.check_march(&volume)?;
+        let (features, why) = self.features(&volume)?;
+        let sigma = self.parameters.medium.sigma_t_per_unit(&volume);
+        let plan = ViewPlan {
+            variant: Variant::new(self.kernel, Some(volume.voxel_type()), features),
             cells: CellUse::Ranges,
-            step: (CELL as f64 * Self::smallest_voxel(volume)) as f32,
+            step: (CELL as f64 * volume.smallest_side()) as f32,
             state_words: STATE_WORDS,
             stepless: true,
             opacity_threshold: 1.0,
             reasons: vec![why, format!("sigma_t_per_unit: {:.6}, {:.6}, {:.6}", sigma[0], sigma[1], sigma[2])],
-        })
-    }
-
-    fn parameters(&self, volume: &Volume, _camera: &Camera) -> Result<Vec<u8>> {
-        let (p, m) = (&self.parameters, &self.parameters.medium);
-        let (features, _) = self.features(volume)?;
-        let sigma = m.sigma_t_per_unit(volume);
-        let most = sigma.into_iter().fold(0.0, f64::max);
-        let [scale, offset, density_most] = m.density();
-        let world_from_index = volume.world_from_index();
-        let emission = m.emission.rgb();
-        let phase = m.phase.numbers(&mut Vec::new(), self.lights.count() * scene::lights::LIGHT_NUMBERS);
-        let mut device = Scattering {
-            world_from_index: std::array::from_fn(|i| world_from_index.to_cols_array()[i] as f32),
-            density_scale: (scale * volume.slope()) as f32,
-            density_offset: (scale * volume.inter() + offset) as f32,
-            density_most: density_most as f32,
-            density_box: m.greatest_density(volume) as f32,
-            sigma_t: sigma.map(|v| v as f32),
-            sigma_most: most as f32,
-            colour: sigma.map(|v| if most > 0.0 { (v / most) as f32 } else { 1.0 }),
-            chromatic: i32::from(sigma.iter().any(|v| *v != sigma[0])),
-            march_step: (p.march_step_voxels * Self::smallest_voxel(volume)) as f32,
-            albedo: m.albedo.rgb().map(|v| v as f32),
-            emission: std::array::from_fn(|i| if sigma[i] > 0.0 { (emission[i] / sigma[i]) as f32 } else { 0.0 }),
-            index: m.index as f32,
-            phase,
-            lights: self.lights.count() as i32,
-            discs: i32::from(self.lights.any_with_size()),
-            lit_by_chance: i32::from(
-                self.lights.any_with_size() || self.lights.sky().is_some() || emission.iter().any(|e| *e > 0.0),
-            ),
-            next_event: i32::from(p.next_event),
-            max_scatterings: p.max_scatterings.map_or(i32::MAX, |n| n as i32),
-            roulette_threshold: p.roulette_threshold as f32,
-            clamp_luminance: p.clamp_luminance.unwrap_or(0.0) as f32,
-            equiangular: i32::from(p.equiangular),
-            sigma_mean: (most * self.mean_density(volume)) as f32,
-            ..Scattering::default()
         };
-        self.cells(volume, features, most, &mut device);
-        self.sky(volume, &mut device);
-        Ok(bytemuck::bytes_of(&device).to_vec())
-    }
-
-    /// The lights, then the rows of a tabulated phase function.
-    fn table(&self, volume: &Volume, _step: f32) -> Result<Vec<u32>> {
-        let mut table = self.lights.table(scene::radius(volume), Framing::from(volume).up());
-        let mut rows = Vec::new();
-        self.parameters.medium.phase.numbers(&mut rows, table.len());
-        table.extend(rows);
-        Ok(table.into_iter().map(f32::to_bits).collect())
+        Ok(Arc::new(Prepared { scatterer: self.clone(), volume, features, sigma_t_per_unit: sigma, plan }))
     }
 
     fn clips(&self) -> bool {
@@ -242,28 +184,107 @@ impl View for Scatterer {
         let p = &self.parameters;
         Some(Random { adaptive: p.adaptive, clamp_luminance: p.clamp_luminance })
     }
+}
 
-    fn warnings(&self, volume: &Volume) -> Vec<Value> {
+/// A scattering view of a volume.
+struct Prepared {
+    scatterer: Scatterer,
+    volume: Arc<Volume>,
+    features: &'static Features,
+    sigma_t_per_unit: [f64; 3],
+    plan: ViewPlan,
+}
+
+impl PreparedView for Prepared {
+    fn plan(&self) -> &ViewPlan {
+        &self.plan
+    }
+
+    fn volume(&self) -> Option<&Arc<Volume>> {
+        Some(&self.volume)
+    }
+
+    fn settings(&self, open: &Open<'_>) -> Option<Settings> {
+        Some(self.scatterer.settings_of(&self.volume, open))
+    }
+
+    fn optics(&self) -> Option<Optics> {
+        Some(self.scatterer.optics_of(&self.volume))
+    }
+
+    fn parameters(&self, _camera: &Camera) -> Vec<u8> {
+        let (view, volume, sigma) = (&self.scatterer, &*self.volume, self.sigma_t_per_unit);
+        let (p, m, lights) = (&view.parameters, &view.parameters.medium, &view.lights);
+        let most = sigma.into_iter().fold(0.0, f64::max);
+        let [scale, offset, density_most] = m.density();
+        let world_from_index = volume.world_from_index();
+        let emission = m.emission.rgb();
+        let phase = m.phase.numbers(&mut Vec::new(), lights.count() * scene::lights::LIGHT_NUMBERS);
+        let mut device = Scattering {
+            world_from_index: std::array::from_fn(|i| world_from_index.to_cols_array()[i] as f32),
+            density_scale: (scale * volume.slope()) as f32,
+            density_offset: (scale * volume.inter() + offset) as f32,
+            density_most: density_most as f32,
+            density_box: m.greatest_density(volume) as f32,
+            sigma_t: sigma.map(|v| v as f32),
+            sigma_most: most as f32,
+            colour: sigma.map(|v| if most > 0.0 { (v / most) as f32 } else { 1.0 }),
+            chromatic: i32::from(sigma.iter().any(|v| *v != sigma[0])),
+            march_step: (p.march_step_voxels * volume.smallest_side()) as f32,
+            albedo: m.albedo.rgb().map(|v| v as f32),
+            emission: std::array::from_fn(|i| if sigma[i] > 0.0 { (emission[i] / sigma[i]) as f32 } else { 0.0 }),
+            index: m.index as f32,
+            phase,
+            lights: lights.count() as i32,
+            discs: i32::from(lights.any_with_size()),
+            lit_by_chance: i32::from(
+                lights.any_with_size() || lights.sky().is_some() || emission.iter().any(|e| *e > 0.0),
+            ),
+            next_event: i32::from(p.next_event),
+            max_scatterings: p.max_scatterings.map_or(i32::MAX, |n| n as i32),
+            roulette_threshold: p.roulette_threshold as f32,
+            clamp_luminance: p.clamp_luminance.unwrap_or(0.0) as f32,
+            equiangular: i32::from(p.equiangular),
+            sigma_mean: (most * view.mean_density(volume)) as f32,
+            ..Scattering::default()
+        };
+        view.cells(volume, self.features, most, &mut device);
+        view.sky(volume, &mut device);
+        bytemuck::bytes_of(&device).to_vec()
+    }
+
+    /// The lights, then the rows of a tabulated phase function.
+    fn table(&self, _step: f32) -> Vec<u32> {
+        let bounds = Bounds::from(&*self.volume);
+        let mut table = self.scatterer.lights.table(bounds.radius(), bounds.up());
+        let mut rows = Vec::new();
+        self.scatterer.parameters.medium.phase.numbers(&mut rows, table.len());
+        table.extend(rows);
+        table.into_iter().map(f32::to_bits).collect()
+    }
+
+    fn warnings(&self) -> Vec<Value> {
+        let (p, volume) = (&self.scatterer.parameters, &*self.volume);
         let mut warnings = Vec::new();
         let mut warn = |code: &str, message: &str, measured: f64, bound: f64| {
             warnings.push(json!({"code": code, "message": message, "measured": measured, "bound": bound}));
         };
         let least = volume.range()[0];
-        if self.parameters.medium.density_window.is_none() && least < 0.0 {
+        if p.medium.density_window.is_none() && least < 0.0 {
             warn("negative_density", "values below 0 are rendered as empty; give medium a density_window", least, 0.0);
         }
-        let tracked = matches!(self.parameters.tracking, Asked::Delta | Asked::Auto);
-        if tracked && self.parameters.majorant.scale < 1.0 && !Self::is_box(volume) {
-            warn("broken_majorant", "majorants are below the extinction: biased", self.parameters.majorant.scale, 1.0);
+        let tracked = matches!(p.tracking, Asked::Delta | Asked::Auto);
+        if tracked && p.majorant.scale < 1.0 && !Scatterer::is_box(volume) {
+            warn("broken_majorant", "majorants are below the extinction: biased", p.majorant.scale, 1.0);
         }
-        if self.parameters.tracking == Asked::March {
-            let depth = self.parameters.march_step_voxels * Self::smallest_voxel(volume);
-            let sigma = self.parameters.medium.sigma_t_per_unit(volume).into_iter().fold(0.0, f64::max);
-            let h = depth * sigma * self.parameters.medium.greatest_density(volume);
+        if p.tracking == Asked::March {
+            let depth = p.march_step_voxels * volume.smallest_side();
+            let sigma = self.sigma_t_per_unit.into_iter().fold(0.0, f64::max);
+            let h = depth * sigma * p.medium.greatest_density(volume);
             let message = "the march's free paths are whole steps: where it is densest they are too long by this part";
             warn("march_bias", message, march_bias(h), 0.0);
         }
-        let missing = self.missing(volume);
+        let missing = self.scatterer.missing(volume);
         if missing > SCATTERINGS_MISSING {
             let message = "this part of what a slab of the same depth would send back is scattered more often than is followed here";
             warn("multiple_scattering_missing", message, missing, SCATTERINGS_MISSING);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde_json::json;
 
 use super::plan::Scatterer;
-use crate::scene;
+use crate::scene::bounds::Bounds;
 use crate::scene::depth::greatest_along_axes;
 use crate::technique::optics::Optics;
 use crate::technique::{Open, Setting, Settings};
@@ -28,7 +28,7 @@ impl Scatterer {
     pub(super) fn optics_of(&self, volume: &Volume) -> Optics {
         let medium = &self.parameters.medium;
         let sigma = medium.sigma_t_per_unit(volume).into_iter().fold(0.0, f64::max);
-        let given = self.parameters.lights.as_ref().map(|_| self.lights.shares(scene::radius(volume)));
+        let given = self.parameters.lights.as_ref().map(|_| self.lights.shares(Bounds::from(volume).radius()));
         let shares = given.unwrap_or_default().into_iter().enumerate();
         Optics {
             optical_depth: greatest_along_axes(volume, |v| medium.density_of(v)).map(|d| sigma * d),

@@ -1,5 +1,7 @@
 //! The plan of `slice`: its kernels, parameters and tables.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use super::{Mode, Parameters, Plane, Slice, TECHNIQUE};
@@ -9,7 +11,7 @@ use crate::error::Result;
 use crate::scene::camera::Camera;
 use crate::scene::interpolation::Interpolation;
 use crate::scene::window::{Output, Window};
-use crate::technique::{CellUse, View, ViewPlan, view_words};
+use crate::technique::{CellUse, PreparedView, Subject, View, ViewPlan, view_words};
 use crate::volume::{Volume, VoxelType};
 
 type Features = [(&'static str, i32); 1];
@@ -63,46 +65,67 @@ impl Parameters {
     }
 }
 
+/// A slice of a volume.
+struct Prepared {
+    parameters: Parameters,
+    volume: Arc<Volume>,
+    window: Window,
+    plan: ViewPlan,
+}
+
 impl View for Parameters {
-    fn plan(&self, volume: &Volume) -> Result<ViewPlan> {
+    fn prepare(&self, subject: &Subject) -> Result<Arc<dyn PreparedView>> {
+        let volume = subject.needed_volume()?.clone();
+        let window = self.window(&volume)?;
         let wanted = [("INTERPOLATION", self.interpolation.unwrap_or(Interpolation::Trilinear).code())];
         let features = permitted(wanted)?;
-        let smallest = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
-        Ok(ViewPlan {
+        let plan = ViewPlan {
             variant: Variant::new(TECHNIQUE.name, Some(volume.voxel_type()), features),
             cells: CellUse::None,
-            step: smallest as f32,
+            step: volume.smallest_side() as f32,
             state_words: 0,
             stepless: true,
             opacity_threshold: 1.0,
-            reasons: vec![format!("window: {}", self.window(volume)?)],
-        })
+            reasons: vec![format!("window: {window}")],
+        };
+        Ok(Arc::new(Prepared { parameters: self.clone(), volume, window, plan }))
+    }
+}
+
+impl PreparedView for Prepared {
+    fn plan(&self) -> &ViewPlan {
+        &self.plan
     }
 
-    fn parameters(&self, volume: &Volume, camera: &Camera) -> Result<Vec<u8>> {
-        let (point, normal) = self.plane.resolve(volume, camera);
+    fn volume(&self) -> Option<&Arc<Volume>> {
+        Some(&self.volume)
+    }
+
+    fn parameters(&self, camera: &Camera) -> Vec<u8> {
+        let (own, volume) = (&self.parameters, &self.volume);
+        let (point, normal) = own.plane.resolve(volume, camera);
         let world_from_index = volume.world_from_index();
         let [a, b, c] = (world_from_index.matrix3.transpose() * normal).to_array();
         let d = normal.dot(world_from_index.translation - point);
-        let [window_scale, window_offset] = self.window(volume)?.scale_and_offset();
-        let wanted = if self.mode == Mode::Minimum { -1.0 } else { 1.0 };
+        let [window_scale, window_offset] = self.window.scale_and_offset();
+        let wanted = if own.mode == Mode::Minimum { -1.0 } else { 1.0 };
         let device = Slice {
             plane_index: [a, b, c, d].map(|v| v as f32),
             normal_index: volume.index_from_world().transform_vector3(normal).as_vec3().to_array(),
-            half_thickness: (0.5 * self.thickness) as f32,
-            peaks: i32::from(self.mode != Mode::Mean),
+            half_thickness: (0.5 * own.thickness) as f32,
+            peaks: i32::from(own.mode != Mode::Mean),
             sign: (wanted * volume.slope().signum()) as f32,
             slope: volume.slope() as f32,
             inter: volume.inter() as f32,
             window_scale,
             window_offset,
-            raw_values: i32::from(self.output == Output::Value),
+            raw_values: i32::from(own.output == Output::Value),
         };
-        Ok(bytemuck::bytes_of(&device).to_vec())
+        bytemuck::bytes_of(&device).to_vec()
     }
 
-    fn table(&self, _volume: &Volume, _step: f32) -> Result<Vec<u32>> {
-        Ok(self.color_map.table(self.invert))
+    fn table(&self, _step: f32) -> Vec<u32> {
+        self.parameters.color_map.table(self.parameters.invert)
     }
 
     fn set_shared(&self, _camera: &Camera, view: &mut DeviceView) {

@@ -13,8 +13,8 @@ use crate::levels::is_full;
 /// Every number of lanes.
 const LANES: [u32; 4] = [1, 4, 8, 16];
 
-/// The variants that are built for so many lanes. All of them run with the device's own number (`variants`). For other numbers each
-/// combination of features is built with one type of voxels, another one each time, so that all types are; `--full` builds all.
+/// The variants that are built for so many lanes: each combination of features with one type of voxels, another for each number of lanes,
+/// so that every variant is built for one. `--full` builds all for all.
 fn built(variants: &[Variant], lanes: u32) -> Vec<Variant> {
     if is_full() {
         return variants.to_vec();
@@ -34,14 +34,10 @@ fn built(variants: &[Variant], lanes: u32) -> Vec<Variant> {
 #[test]
 fn every_variant_builds_with_warnings_as_errors() {
     in_processes("device::builds::every_variant_builds_with_warnings_as_errors", &["1 16", "4 8"], |some| {
-        let own = open(None, None).info().lanes;
         for lanes in some.split(' ').map(|n| n.parse().unwrap()) {
             let mut device = open(Some(lanes), None);
             for source in run::sources() {
-                let variants = (source.variants)();
-                // What runs with the device's own number of lanes is built for that, with warnings as errors, when it runs.
-                let chosen = if lanes == own && !is_full() { Vec::new() } else { built(&variants, lanes) };
-                for variant in chosen {
+                for variant in built(&(source.variants)(), lanes) {
                     assert!(variant.options(lanes, false, true).contains("-Werror"));
                     let built = device.build(&source, &variant);
                     built.unwrap_or_else(|e| panic!("{} with {lanes} lanes: {e}", variant.label()));

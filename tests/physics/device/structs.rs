@@ -23,8 +23,7 @@ fn offsets_on_the_device(layouts: &'static [Layout]) -> Vec<usize> {
     }
     std::fs::write(folder.path().join("offsets.cl"), text + "}\n").unwrap();
     let mut device = open(None, Some(folder.path()));
-    let source =
-        Source { kernel: "offsets", words: String::new, structs: Vec::new, variants: Vec::new, common: 0 };
+    let source = Source { kernel: "offsets", words: String::new, structs: Vec::new, variants: Vec::new, common: 0 };
     let variant = Variant::new("offsets", None, &[]);
     device.build(&source, &variant).unwrap();
     let mut out = vec![-1i32; count];

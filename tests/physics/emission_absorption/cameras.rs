@@ -3,8 +3,8 @@
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use crate::common::engine::House;
 use super::oracle::{Eye, inside};
+use crate::common::engine::House;
 
 const SIDE: usize = 32;
 

@@ -3,8 +3,8 @@
 use glam::{DVec3, dvec3};
 use serde_json::{Value, json};
 
-use crate::common::engine::House;
 use super::oracle::{Eye, inside, march, trilinear};
+use crate::common::engine::House;
 
 const SIDE: usize = 48;
 

@@ -25,7 +25,7 @@ fn white(sigma: f64) -> Value {
 fn raw(dims: &str, kind: &str, bytes: Vec<u8>) -> Value {
     let text = |s: &str| Some(s.to_owned());
     let query = RawQuery { dims: text(dims), r#type: text(kind), spacing: None, endian: None };
-    json!({"id": House::shared().store().insert(bytes, "test", query.parse().unwrap()).unwrap().1})
+    json!({"id": House::shared().assets().volumes().insert(bytes, "test", query.parse().unwrap()).unwrap().1})
 }
 
 fn alphas(request: &Value) -> Vec<f32> {

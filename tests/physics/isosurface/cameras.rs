@@ -3,8 +3,8 @@
 use glam::{DVec3, dvec3};
 use serde_json::{Value, json};
 
-use crate::common::engine::House;
 use super::depth::{ISOVALUE, SIDE, VOXEL, check, crossings, depths, film_depths, waves};
+use crate::common::engine::House;
 use crate::emission_absorption::oracle::{Eye, inside};
 
 const DISTANCE: f64 = 4.0;

@@ -3,10 +3,10 @@
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use crate::common::engine::House;
 use super::depth::{SIDE, depths};
-use crate::projection::grid::Grid;
+use crate::common::engine::House;
 use crate::emission_absorption::oracle::{Eye, inside};
+use crate::projection::grid::Grid;
 
 const RADIUS: f64 = 0.7;
 

@@ -4,8 +4,8 @@ use glam::{DVec3, dvec3};
 use serde_json::{Value, json};
 
 use crate::common::engine::House;
-use crate::projection::grid::Grid;
 use crate::emission_absorption::oracle::{Eye, inside};
+use crate::projection::grid::Grid;
 
 pub const SIDE: usize = 24;
 const DIMS: [usize; 3] = [40, 37, 43];

@@ -3,8 +3,8 @@
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use crate::common::engine::House;
 use super::depth::SIDE;
+use crate::common::engine::House;
 use crate::emission_absorption::oracle::Eye;
 
 const RADIUS: f64 = 0.6;

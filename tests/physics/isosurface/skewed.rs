@@ -3,10 +3,10 @@
 use glam::{DMat3, DVec3, dvec3};
 use serde_json::{Value, json};
 
-use crate::common::engine::House;
 use super::depth::{SIDE, depths};
-use crate::emission_absorption::oracle::Eye;
+use crate::common::engine::House;
 use crate::common::writers::nrrd;
+use crate::emission_absorption::oracle::Eye;
 
 const DIMS: [usize; 3] = [15, 22, 13];
 const GRADIENT: DVec3 = dvec3(0.6, -0.35, 0.8);

@@ -4,11 +4,11 @@ use glam::{DVec3, dvec3};
 use serde_json::json;
 
 use super::cameras::{origin, parallel};
-use crate::common::engine::House;
 use super::depth::{VOXEL, check, crossings, depths};
-use crate::projection::grid::Grid;
-use crate::emission_absorption::oracle::inside;
+use crate::common::engine::House;
 use crate::common::writers::Random;
+use crate::emission_absorption::oracle::inside;
+use crate::projection::grid::Grid;
 
 /// What makes a voxel of that side.
 const N: usize = 43;

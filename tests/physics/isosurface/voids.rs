@@ -3,11 +3,11 @@
 use glam::{DVec3, dvec3};
 use serde_json::{Value, json};
 
+use super::depth::{SIDE, depths};
 use crate::common::engine::House;
 use crate::common::mri_head;
-use super::depth::{SIDE, depths};
-use crate::emission_absorption::oracle::{Eye, inside};
 use crate::common::writers::Nifti;
+use crate::emission_absorption::oracle::{Eye, inside};
 
 /// Without skipping, since a cell whose voxels are all on one side of the isovalue would hide what is wrong in it.
 fn picture(house: &House, volume: &Value, eye: &Eye, own: &Value, step_voxels: f64) -> Vec<f32> {

@@ -10,13 +10,13 @@ use cloudchamber::run;
 use cloudchamber::volume::VoxelType;
 use rayon::prelude::*;
 
-use crate::common::{kernel_cache, kernels, say};
 use super::compiler::{Compiler, LEVELS, Level};
+use crate::common::{keep_kernels, kernels, say};
 
 fn compiler() -> &'static Compiler {
     static COMPILER: OnceLock<Compiler> = OnceLock::new();
     COMPILER.get_or_init(|| {
-        device::keep_compiled_kernels_in(&kernel_cache()).unwrap();
+        keep_kernels();
         Compiler::of(&device::select("pocl", None).unwrap().1.platform_version)
     })
 }

@@ -5,9 +5,8 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
-use crate::common;
-use crate::common::picture::Picture;
 use super::compiler::{LEVELS, Level};
+use crate::common::picture::Picture;
 
 /// A level that a higher one can be made to work at.
 pub struct Lower {

@@ -2,9 +2,9 @@
 
 use std::time::Instant;
 
+use super::lower::{Lower, Program};
 use crate::common::pictures::{self, Asked};
 use crate::common::say;
-use super::lower::{Lower, Program};
 
 /// The bound that pictures of other numbers of lanes are held to.
 fn check_same(program: &Program, lower: &Lower, asked: &Asked) {

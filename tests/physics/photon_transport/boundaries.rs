@@ -2,9 +2,9 @@
 
 use serde_json::{Value, json};
 
-use crate::common::engine::House;
 use super::run::{fraction, judge, simulate, with};
 use super::trackers::LEDGER;
+use crate::common::engine::House;
 
 /// Reflectance of unpolarised light, in double precision.
 fn fresnel(n1: f64, n2: f64, cosine: f64) -> f64 {

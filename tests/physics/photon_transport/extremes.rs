@@ -4,9 +4,9 @@ use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 use serde_json::{Value, json};
 
-use crate::common::engine::House;
 use super::run::{fraction, request, simulate, with};
 use super::trackers::LEDGER;
+use crate::common::engine::House;
 
 /// The ledger's sum, with every part finite.
 fn sum(result: &Value) -> f64 {

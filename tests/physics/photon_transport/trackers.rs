@@ -2,9 +2,9 @@
 
 use serde_json::{Value, json};
 
-use crate::common::engine::House;
 use super::published::slab;
 use super::run::{chi_squared_excess, fraction, judge, request, simulate, spread, with};
+use crate::common::engine::House;
 
 /// A medium that only absorbs, 1 per mm, so deep that nothing gets through: the mean path is the mean free path.
 fn free_paths(tracking: &str, more: &Value) -> Value {

@@ -3,8 +3,8 @@
 use cloudchamber::volume::builtin::chamber_value;
 use serde_json::{Value, json};
 
-use crate::common::engine::House;
 use super::oracle::{Random, photon};
+use crate::common::engine::House;
 
 const FRACTIONS: [&str; 8] =
     ["exit_minus_x", "exit_plus_x", "exit_minus_y", "exit_plus_y", "exit_minus_z", "exit_plus_z", "absorbed", "lost"];

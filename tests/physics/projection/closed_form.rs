@@ -3,8 +3,8 @@
 use glam::{DVec3, dvec3};
 use serde_json::json;
 
-use crate::common::engine::House;
 use super::grid::{Grid, eyes, numbers, rays};
+use crate::common::engine::House;
 use crate::emission_absorption::oracle::{Eye, inside};
 
 const AXES: DVec3 = dvec3(0.8, 0.55, 0.65);

@@ -2,8 +2,8 @@
 
 use serde_json::json;
 
-use crate::common::engine::House;
 use super::grid::{Grid, eyes, numbers, rays};
+use crate::common::engine::House;
 
 fn check(grid: &Grid, interpolation: &str) {
     let house = House::shared();

@@ -2,8 +2,8 @@
 
 use serde_json::json;
 
-use crate::common::engine::House;
 use super::grid::{Grid, eyes, numbers, rays};
+use crate::common::engine::House;
 use crate::emission_absorption::oracle::Eye;
 
 fn check(grid: &Grid, interpolation: &str) {

@@ -5,8 +5,8 @@ use cloudchamber::technique::slice;
 use glam::dvec3;
 use serde_json::json;
 
-use crate::common::engine::House;
 use super::planes::{Camera, SIDE};
+use crate::common::engine::House;
 
 #[test]
 fn what_makes_no_sense_is_refused_by_its_name() {

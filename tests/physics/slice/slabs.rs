@@ -3,8 +3,8 @@
 use glam::{DVec3, dvec3};
 use serde_json::json;
 
-use crate::common::engine::House;
 use super::planes::{Camera, numbers};
+use crate::common::engine::House;
 
 #[test]
 fn a_slab_of_a_linear_field_in_closed_form() {

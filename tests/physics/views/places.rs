@@ -4,8 +4,8 @@ use cloudchamber::volume::RawType;
 use glam::{DAffine3, DMat3, DVec3, dvec3};
 use serde_json::{Value, json};
 
-use crate::common::engine::House;
 use super::support::{Camera, pixels, request};
+use crate::common::engine::House;
 use crate::common::writers::Nifti;
 
 const SIDE: usize = 48;

@@ -7,8 +7,8 @@ use cloudchamber::film::{ErrorEstimate, Film};
 use glam::{DVec3, dvec3};
 use serde_json::{Value, json};
 
-use crate::common::engine::House;
 use super::support::{Camera, grid, pixels, request};
+use crate::common::engine::House;
 
 /// So many that counting them is good for an area: at 48 the count of a true disc is up to 1 % off.
 const SIDE: usize = 96;

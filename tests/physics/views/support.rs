@@ -23,7 +23,7 @@ pub fn grid(dims: [usize; 3], spacing: [f64; 3], value: impl Fn(DVec3) -> f64) -
         spacing: Some(spacing.map(|s| s.to_string()).join(",")),
         endian: None,
     };
-    let (_, id, _) = House::shared().store().insert(bytes, "views", query.parse().unwrap()).unwrap();
+    let (_, id, _) = House::shared().assets().volumes().insert(bytes, "views", query.parse().unwrap()).unwrap();
     json!({"id": id})
 }
 

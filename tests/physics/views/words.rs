@@ -20,7 +20,7 @@ fn value(i: usize) -> u16 {
 fn volume(house: &House, name: &str, bytes: Vec<u8>) -> Value {
     let dims = Some(format!("{SIDE},{SIDE},{SIDE}"));
     let query = RawQuery { dims, r#type: Some(name.into()), spacing: None, endian: None };
-    json!({"id": house.store().insert(bytes, name, query.parse().unwrap()).unwrap().1})
+    json!({"id": house.assets().volumes().insert(bytes, name, query.parse().unwrap()).unwrap().1})
 }
 
 /// What is looked at by values from `least` on.

@@ -11,7 +11,7 @@ const METHODS: [&str; 4] = ["get", "post", "put", "delete"];
 
 /// Method and path of every route in the source. `/docs` describes itself.
 fn routes() -> BTreeSet<(String, String)> {
-    let source = include_str!("../../src/http/routes.rs");
+    let source = include_str!("../../../src/http/routes.rs");
     let mut routes = BTreeSet::new();
     for route in source.split(".route(\"").skip(1) {
         let (path, rest) = route.split_once('"').unwrap();

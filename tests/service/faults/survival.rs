@@ -2,9 +2,9 @@
 
 use std::time::{Duration, Instant};
 
+use super::{bodies, cameras, fields, voxels};
 use crate::common::Server;
 use crate::support::*;
-use super::{bodies, cameras, fields, voxels};
 
 #[tokio::test]
 async fn after_every_fault_the_server_renders_and_its_memory_is_what_it_was() {

@@ -4,8 +4,8 @@ use cloudchamber::volume::RawType;
 use serde_json::{Value, json};
 
 use crate::common::Server;
-use crate::support::*;
 use crate::common::writers::{Nifti, gzip, nrrd, small_nifti, small_nrrd};
+use crate::support::*;
 
 /// `(about, query, body, permitted statuses)`.
 fn cases() -> Vec<(&'static str, &'static str, Vec<u8>, &'static [u16])> {

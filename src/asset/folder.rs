@@ -1,9 +1,9 @@
-//! The store's folder: for each upload the body as it came and a JSON record, which is written last.
+//! A store's folder: for each upload the body as it came and a JSON record, which is written last.
 //!
 //! Every file is written under a temporary name, flushed and renamed. A crash leaves at worst a body without a
 //! record or a temporary file; both are removed at the next start.
 
-use super::{RawParams, VolumeInfo};
+use super::Asset;
 use crate::error::{Error, Result};
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -16,41 +16,25 @@ const ID_DIGITS: usize = 32;
 const TEMPORARY: &str = "tmp-";
 
 /// What stands beside an upload in `ID.json`.
-#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
-pub(super) struct Record {
+#[derive(serde::Serialize, serde::Deserialize)]
+#[serde(bound = "")]
+pub(super) struct Record<A: Asset> {
     /// What is told of it in lists.
-    pub info: VolumeInfo,
-    /// How its voxels are to be read, if it does not say itself.
-    pub raw: Option<RawParams>,
-    /// Extension of the uploaded file.
-    pub extension: Extension,
+    pub info: A::Info,
+    /// How its bytes are to be read, if they do not say so themselves.
+    pub raw: Option<A::How>,
+    /// Extension of the uploaded file, after its content.
+    pub extension: String,
     /// Bytes of the uploaded file.
     pub file_bytes: u64,
     /// Seconds since 1970.
     pub created_unix_s: u64,
 }
 
-/// Extension of a stored upload, after its content.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub(super) enum Extension {
-    #[serde(rename = "nii")]
-    Nii,
-    #[serde(rename = "nii.gz")]
-    NiiGz,
-    #[serde(rename = "nrrd")]
-    Nrrd,
-    #[serde(rename = "raw")]
-    Raw,
-}
-
-impl Extension {
-    fn text(self) -> &'static str {
-        match self {
-            Self::Nii => "nii",
-            Self::NiiGz => "nii.gz",
-            Self::Nrrd => "nrrd",
-            Self::Raw => "raw",
-        }
+impl<A: Asset> Clone for Record<A> {
+    fn clone(&self) -> Self {
+        let (info, raw, extension) = (self.info.clone(), self.raw.clone(), self.extension.clone());
+        Self { info, raw, extension, file_bytes: self.file_bytes, created_unix_s: self.created_unix_s }
     }
 }
 
@@ -59,12 +43,19 @@ pub(super) fn is_id(text: &str) -> bool {
     text.len() == ID_DIGITS && text.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
 }
 
+/// True if the text is an extension as assets have them.
+fn is_extension(text: &str) -> bool {
+    !text.is_empty()
+        && text.bytes().all(|byte| matches!(byte, b'a'..=b'z' | b'0'..=b'9' | b'.'))
+        && !text.contains("..")
+}
+
 /// The id of a body: its hash, and that of how it is to be read.
-pub(super) fn id_of(bytes: &[u8], raw: Option<&RawParams>) -> Result<String> {
+pub(super) fn id_of(bytes: &[u8], how: Option<&impl serde::Serialize>) -> Result<String> {
     let mut hasher = blake3::Hasher::new();
     hasher.update(bytes);
-    if let Some(raw) = raw {
-        hasher.update(&serde_json::to_vec(raw).map_err(Error::internal)?);
+    if let Some(how) = how {
+        hasher.update(&serde_json::to_vec(how).map_err(Error::internal)?);
     }
     Ok(hasher.finalize().to_hex().chars().take(ID_DIGITS).collect())
 }
@@ -74,15 +65,15 @@ pub(super) struct Folder(PathBuf);
 
 impl Folder {
     /// Opens or creates the folder, removes what a crash has left, and reads the records.
-    pub fn open(dir: &Path) -> Result<(Self, Vec<(String, Record)>)> {
-        fs::create_dir_all(dir).map_err(|cause| failed("create the folder for volumes", &cause))?;
+    pub fn open<A: Asset>(dir: &Path) -> Result<(Self, Vec<(String, Record<A>)>)> {
+        fs::create_dir_all(dir).map_err(|cause| failed("create the folder of a store", &cause))?;
         let folder = Self(dir.to_owned());
         let names = folder.names()?;
         let mut records = Vec::new();
         for id in names.iter().filter_map(|name| name.strip_suffix(".json")).filter(|id| is_id(id)) {
             match folder.read_record(id) {
                 Ok(record) => records.push((id.to_owned(), record)),
-                Err(cause) => tracing::warn!(id, %cause, "a stored volume cannot be used"),
+                Err(cause) => tracing::warn!(id, %cause, "what is stored cannot be used"),
             }
         }
         for name in &names {
@@ -99,33 +90,36 @@ impl Folder {
     }
 
     fn names(&self) -> Result<Vec<String>> {
-        let entries = fs::read_dir(&self.0).map_err(|cause| failed("list the stored volumes", &cause))?;
+        let entries = fs::read_dir(&self.0).map_err(|cause| failed("list what is stored", &cause))?;
         let names = entries.map(|entry| entry.map(|entry| entry.file_name().into_string()));
         let names: Result<Vec<_>, _> = names.collect::<io::Result<_>>();
-        let names = names.map_err(|cause| failed("list the stored volumes", &cause))?;
+        let names = names.map_err(|cause| failed("list what is stored", &cause))?;
         Ok(names.into_iter().filter_map(Result::ok).collect())
     }
 
-    fn read_record(&self, id: &str) -> Result<Record> {
+    fn read_record<A: Asset>(&self, id: &str) -> Result<Record<A>> {
         let text = fs::read(self.0.join(format!("{id}.json"))).map_err(|cause| failed("read a record", &cause))?;
-        let record: Record = serde_json::from_slice(&text).map_err(Error::internal)?;
+        let record: Record<A> = serde_json::from_slice(&text).map_err(Error::internal)?;
         let body = fs::metadata(self.body_path(id, &record)).map_err(|cause| failed("find a body", &cause))?;
-        if body.len() != record.file_bytes || record.info.id.as_deref() != Some(id) {
+        if body.len() != record.file_bytes
+            || A::id_and_name(&record.info).0 != Some(id)
+            || !is_extension(&record.extension)
+        {
             return Err(Error::internal("the record does not agree with its body"));
         }
         Ok(record)
     }
 
-    fn body_path(&self, id: &str, record: &Record) -> PathBuf {
-        self.0.join(format!("{id}.{}", record.extension.text()))
+    fn body_path<A: Asset>(&self, id: &str, record: &Record<A>) -> PathBuf {
+        self.0.join(format!("{id}.{}", record.extension))
     }
 
     /// Writes an upload: the body first, then the record that makes it count.
-    pub fn write(&self, id: &str, bytes: &[u8], record: &Record) -> Result<()> {
+    pub fn write<A: Asset>(&self, id: &str, bytes: &[u8], record: &Record<A>) -> Result<()> {
         let text = serde_json::to_vec_pretty(record).map_err(Error::internal)?;
         self.write_file(&self.body_path(id, record), id, bytes)
             .and_then(|()| self.write_file(&self.0.join(format!("{id}.json")), id, &text))
-            .map_err(|cause| failed("store a volume", &cause))
+            .map_err(|cause| failed("store an upload", &cause))
     }
 
     fn write_file(&self, path: &Path, id: &str, bytes: &[u8]) -> io::Result<()> {
@@ -143,19 +137,19 @@ impl Folder {
     }
 
     /// The body of an upload.
-    pub fn read(&self, id: &str, record: &Record) -> Result<Vec<u8>> {
-        fs::read(self.body_path(id, record)).map_err(|cause| failed("read a stored volume", &cause))
+    pub fn read<A: Asset>(&self, id: &str, record: &Record<A>) -> Result<Vec<u8>> {
+        fs::read(self.body_path(id, record)).map_err(|cause| failed("read what is stored", &cause))
     }
 
     /// Removes an upload: the record first, so that no record is without its body.
-    pub fn remove(&self, id: &str, record: &Record) -> Result<()> {
+    pub fn remove<A: Asset>(&self, id: &str, record: &Record<A>) -> Result<()> {
         self.remove_file(&format!("{id}.json"))?;
-        self.remove_file(&format!("{id}.{}", record.extension.text()))
+        self.remove_file(&format!("{id}.{}", record.extension))
     }
 
     fn remove_file(&self, name: &str) -> Result<()> {
         match fs::remove_file(self.0.join(name)) {
-            Err(cause) if cause.kind() != io::ErrorKind::NotFound => Err(failed("remove a stored volume", &cause)),
+            Err(cause) if cause.kind() != io::ErrorKind::NotFound => Err(failed("remove what is stored", &cause)),
             _ => Ok(()),
         }
     }

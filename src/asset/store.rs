@@ -1,0 +1,185 @@
+//! Assets of one kind by id: uploads kept in a folder, decoded only while they are used.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+use std::time::SystemTime;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::cache::{Resident, SharedCache};
+use super::folder::{Folder, Record, id_of, is_id};
+use super::{AssetLimits, lock};
+use crate::error::{Error, Result};
+
+/// A kind of thing that is stored as the file that it was uploaded in.
+pub trait Asset: Resident + Sized {
+    /// What it is called: `volume`.
+    const KIND: &'static str;
+    /// What says how its bytes are to be read, where they do not say so themselves. It is part of its id.
+    type How: Clone + Serialize + DeserializeOwned + Send;
+    /// What is told of it.
+    type Info: Clone + Serialize + DeserializeOwned + Send;
+    /// Reads one.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] where the bytes are none of this kind; [`Error::TooLarge`] above the limits.
+    fn read(bytes: &[u8], name: &str, how: Option<Self::How>, limits: &AssetLimits) -> Result<Self>;
+    /// All that is told of it.
+    fn info(&self, id: &str) -> Self::Info;
+    /// What is told of it in lists.
+    fn brief(&self, id: &str) -> Self::Info;
+    /// Its id, where it has one, and its name.
+    fn id_and_name(info: &Self::Info) -> (Option<&str>, &str);
+    /// The extension of its file, after its content: letters, digits and points.
+    fn extension(&self, bytes: &[u8]) -> &'static str;
+}
+
+/// Uploads of one kind.
+pub struct Store<A: Asset> {
+    folder: Folder,
+    limits: AssetLimits,
+    records: Mutex<BTreeMap<String, Record<A>>>,
+    cache: SharedCache,
+    /// Held while one is decoded or written: one at a time, so that many requests together take no more memory than one, and the same content
+    /// sent twice at once is stored once. Taken before the others, never after.
+    working: Mutex<()>,
+}
+
+impl<A: Asset> Store<A> {
+    /// Opens or creates a store in the folder `dir`.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] if the folder cannot be used.
+    pub(super) fn open(dir: &Path, limits: AssetLimits, cache: SharedCache) -> Result<Self> {
+        let (folder, records) = Folder::open::<A>(dir)?;
+        Ok(Self { folder, limits, records: Mutex::new(records.into_iter().collect()), cache, working: Mutex::new(()) })
+    }
+
+    /// Reads and keeps an upload. Returns it with its id, and whether it is new: the same content, read in the same way, is one, under the
+    /// name that it had first.
+    ///
+    /// # Errors
+    /// Those of [`Asset::read`]; [`Error::TooLarge`] if the store is full.
+    pub fn insert(&self, bytes: Vec<u8>, name: &str, how: Option<A::How>) -> Result<(Arc<A>, String, bool)> {
+        let id = id_of(&bytes, how.as_ref())?;
+        let _working = lock(&self.working);
+        if lock(&self.records).contains_key(&id) {
+            return Ok((self.decoded(&id)?, id, false));
+        }
+        self.check_space(bytes.len() as u64)?;
+        let asset = Arc::new(A::read(&bytes, name, how.clone(), &self.limits)?);
+        let created = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        let record = Record {
+            info: asset.brief(&id),
+            raw: how,
+            extension: asset.extension(&bytes).to_owned(),
+            file_bytes: bytes.len() as u64,
+            created_unix_s: created.as_secs(),
+        };
+        self.folder.write(&id, &bytes, &record)?;
+        lock(&self.records).insert(id.clone(), record);
+        lock(&self.cache).put(key::<A>(&id), &asset);
+        Ok((asset, id, true))
+    }
+
+    fn check_space(&self, more: u64) -> Result<()> {
+        let held = self.file_bytes();
+        if held.saturating_add(more) > self.limits.max_store_bytes {
+            let what = format!("the store with these {more} bytes added to its {held}");
+            return Err(Error::TooLarge { what, limit: format!("{} bytes", self.limits.max_store_bytes) });
+        }
+        Ok(())
+    }
+
+    /// An upload, decoded again if it was forgotten.
+    ///
+    /// # Errors
+    /// [`Error::NotFound`] for an unknown id, also one that is not an id at all.
+    pub fn get(&self, id: &str) -> Result<Arc<A>> {
+        self.record(id)?;
+        if let Some(asset) = self.cached(id) {
+            return Ok(asset);
+        }
+        let _working = lock(&self.working);
+        self.decoded(id)
+    }
+
+    /// The one of a known id; `working` is held.
+    fn decoded(&self, id: &str) -> Result<Arc<A>> {
+        if let Some(asset) = self.cached(id) {
+            return Ok(asset);
+        }
+        let record = self.record(id)?;
+        let bytes = self.folder.read(id, &record)?;
+        let (_, name) = A::id_and_name(&record.info);
+        let asset = A::read(&bytes, name, record.raw.clone(), &self.limits).map_err(|cause| {
+            Error::internal(format!("the stored {} {id} cannot be read any more: {cause}", A::KIND))
+        })?;
+        let asset = Arc::new(asset);
+        lock(&self.cache).put(key::<A>(id), &asset);
+        Ok(asset)
+    }
+
+    /// As [`Store::get`], where the request's field at `pointer` names it.
+    ///
+    /// # Errors
+    /// Those of [`Store::get`]; [`Error::Invalid`] with the pointer where there is no such one.
+    pub fn named(&self, id: &str, pointer: &str) -> Result<Arc<A>> {
+        self.get(id).map_err(|e| match e {
+            Error::NotFound { .. } => {
+                let permitted = format!("an id from /v1/{}s", A::KIND);
+                Error::invalid(pointer, format!("there is no {} '{id}'", A::KIND), permitted)
+            }
+            other => other,
+        })
+    }
+
+    /// What is known of an upload, in full.
+    ///
+    /// # Errors
+    /// As [`Store::get`].
+    pub fn info(&self, id: &str) -> Result<A::Info> {
+        Ok(self.get(id)?.info(id))
+    }
+
+    /// The uploads, oldest first. Decodes nothing.
+    pub fn list(&self) -> Vec<A::Info> {
+        let records = lock(&self.records);
+        let mut uploads: Vec<_> = records.values().collect();
+        uploads.sort_by_key(|record| record.created_unix_s);
+        uploads.into_iter().map(|record| record.info.clone()).collect()
+    }
+
+    /// Removes an upload from memory and disk. Renders that use it go on.
+    ///
+    /// # Errors
+    /// [`Error::NotFound`] for an unknown id.
+    pub fn delete(&self, id: &str) -> Result<()> {
+        let _working = lock(&self.working);
+        let record = self.record(id)?;
+        self.folder.remove(id, &record)?;
+        lock(&self.records).remove(id);
+        lock(&self.cache).remove(&key::<A>(id));
+        Ok(())
+    }
+
+    /// Bytes of all uploaded files on disk.
+    pub(super) fn file_bytes(&self) -> u64 {
+        lock(&self.records).values().map(|record| record.file_bytes).sum()
+    }
+
+    fn cached(&self, id: &str) -> Option<Arc<A>> {
+        lock(&self.cache).get(&key::<A>(id))
+    }
+
+    fn record(&self, id: &str) -> Result<Record<A>> {
+        let found = if is_id(id) { lock(&self.records).get(id).cloned() } else { None };
+        found.ok_or_else(|| Error::NotFound { what: A::KIND, id: id.chars().take(64).collect() })
+    }
+}
+
+fn key<A: Asset>(id: &str) -> String {
+    format!("{} {id}", A::KIND)
+}
