@@ -10,9 +10,9 @@ use crate::asset::Assets;
 use crate::config::Limits;
 use crate::device::DeviceConfig;
 use crate::error::{Error, Result};
-use crate::job::{CancelOnDrop, Engine, Job, Place, State};
+use crate::job::{CancelOnDrop, Engine, Job, Place, State, Task};
 use crate::plan::{Calibrations, Planner};
-use crate::render::Scene;
+use crate::render::{ExportTask, Scene};
 use crate::run::DeviceExecutor;
 
 /// A handle on the service; clones share it.
@@ -32,7 +32,7 @@ struct Shared {
 pub struct Prepared {
     place: Place,
     request: Value,
-    scene: Scene,
+    task: Task,
     planned: Option<Value>,
 }
 
@@ -83,19 +83,42 @@ impl Service {
     /// Those of the planner, of [`Engine::reserve`] and of [`Service::scene`].
     pub async fn prepare(&self, request: Value) -> Result<Prepared> {
         let (request, planned) = self.planner().resolve(request).await?;
+        self.load(request, planned, |service, request| {
+            service.scene(request).map(|scene| Task::Picture(Box::new(scene)))
+        })
+        .await
+    }
+
+    /// Takes a place in the queue, checks the request of an export and loads what it names.
+    ///
+    /// # Errors
+    /// Those of [`Engine::reserve`] and of [`ExportTask::from_json`].
+    pub async fn prepare_export(&self, request: Value) -> Result<Prepared> {
+        let task = |service: &Self, request: &Value| {
+            ExportTask::from_json(request, service.assets(), service.limits()).map(|task| Task::File(Box::new(task)))
+        };
+        self.load(request, None, task).await
+    }
+
+    async fn load(
+        &self,
+        request: Value,
+        planned: Option<Value>,
+        task: impl FnOnce(&Self, &Value) -> Result<Task> + Send + 'static,
+    ) -> Result<Prepared> {
         // A place in the queue before anything is loaded for the request.
         let place = self.engine().reserve()?;
         // The runtime's own threads must not wait until a volume is decoded or a built-in is made.
         let service = self.clone();
-        let loaded = tokio::task::spawn_blocking(move || service.scene(&request).map(|scene| (request, scene))).await;
-        let (request, scene) = loaded.map_err(Error::internal)??;
-        Ok(Prepared { place, request, scene, planned })
+        let loaded = tokio::task::spawn_blocking(move || task(&service, &request).map(|task| (request, task))).await;
+        let (request, task) = loaded.map_err(Error::internal)??;
+        Ok(Prepared { place, request, task, planned })
     }
 
     /// Queues a prepared request.
     pub fn queue(&self, prepared: Prepared) -> Arc<Job> {
-        let Prepared { place, request, scene, planned } = prepared;
-        self.engine().submit(place, request, scene, planned)
+        let Prepared { place, request, task, planned } = prepared;
+        self.engine().submit(place, request, task, planned)
     }
 
     /// Prepares a request and queues it.
@@ -111,12 +134,26 @@ impl Service {
     /// # Errors
     /// As [`Service::prepare`], and what the render failed by.
     pub async fn submit_and_wait(&self, request: Value) -> Result<Arc<Job>> {
-        let guard = CancelOnDrop::new(self.engine(), self.submit(request).await?);
+        let job = self.submit(request).await?;
+        self.wait(job).await
+    }
+
+    /// Submits the request of an export and waits for its end. It is cancelled when this future is dropped.
+    ///
+    /// # Errors
+    /// As [`Service::prepare_export`], and what the export failed by.
+    pub async fn export_and_wait(&self, request: Value) -> Result<Arc<Job>> {
+        let job = self.queue(self.prepare_export(request).await?);
+        self.wait(job).await
+    }
+
+    async fn wait(&self, job: Arc<Job>) -> Result<Arc<Job>> {
+        let guard = CancelOnDrop::new(self.engine(), job);
         let job = guard.job();
         job.watch().wait_for(|u| u.state.is_terminal()).await.map(drop).map_err(Error::internal)?;
         match job.state() {
             State::Done => Ok(job.clone()),
-            _ => Err(job.failure().unwrap_or_else(|| Error::Conflict("the render was cancelled".into()))),
+            _ => Err(job.failure().unwrap_or_else(|| Error::Conflict("it was cancelled".into()))),
         }
     }
 }

@@ -3,8 +3,9 @@
 //! Every file is written under a temporary name, flushed and renamed. A crash leaves at worst a body without a
 //! record or a temporary file; both are removed at the next start.
 
-use super::Asset;
+use super::kind::Asset;
 use crate::error::{Error, Result};
+use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -30,6 +31,9 @@ pub(super) struct Record<A: Asset> {
     /// Seconds since 1970.
     pub created_unix_s: u64,
 }
+
+/// Records by id.
+pub(super) type Records<A> = BTreeMap<String, Record<A>>;
 
 impl<A: Asset> Clone for Record<A> {
     fn clone(&self) -> Self {
@@ -65,14 +69,14 @@ pub(super) struct Folder(PathBuf);
 
 impl Folder {
     /// Opens or creates the folder, removes what a crash has left, and reads the records.
-    pub fn open<A: Asset>(dir: &Path) -> Result<(Self, Vec<(String, Record<A>)>)> {
+    pub fn open<A: Asset>(dir: &Path) -> Result<(Self, Records<A>)> {
         fs::create_dir_all(dir).map_err(|cause| failed("create the folder of a store", &cause))?;
         let folder = Self(dir.to_owned());
         let names = folder.names()?;
-        let mut records = Vec::new();
+        let mut records = Records::new();
         for id in names.iter().filter_map(|name| name.strip_suffix(".json")).filter(|id| is_id(id)) {
             match folder.read_record(id) {
-                Ok(record) => records.push((id.to_owned(), record)),
+                Ok(record) => drop(records.insert(id.to_owned(), record)),
                 Err(cause) => tracing::warn!(id, %cause, "what is stored cannot be used"),
             }
         }

@@ -5,6 +5,7 @@
 
 mod cache;
 mod folder;
+mod kind;
 mod store;
 mod volume;
 
@@ -13,7 +14,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 pub use cache::Resident;
 use cache::{Cache, SharedCache};
-pub use store::{Asset, Store};
+pub use kind::Asset;
+pub use store::Store;
 
 use crate::error::{Error, Result};
 use crate::volume::builtin::{self, BUILTINS};

@@ -1,46 +1,20 @@
 //! Assets of one kind by id: uploads kept in a folder, decoded only while they are used.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::SystemTime;
 
-use serde::Serialize;
-use serde::de::DeserializeOwned;
-
-use super::cache::{Resident, SharedCache};
-use super::folder::{Folder, Record, id_of, is_id};
+use super::cache::SharedCache;
+use super::folder::{Folder, Record, Records, id_of, is_id};
+use super::kind::Asset;
 use super::{AssetLimits, lock};
 use crate::error::{Error, Result};
-
-/// A kind of thing that is stored as the file that it was uploaded in.
-pub trait Asset: Resident + Sized {
-    /// What it is called: `volume`.
-    const KIND: &'static str;
-    /// What says how its bytes are to be read, where they do not say so themselves. It is part of its id.
-    type How: Clone + Serialize + DeserializeOwned + Send;
-    /// What is told of it.
-    type Info: Clone + Serialize + DeserializeOwned + Send;
-    /// Reads one.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`] where the bytes are none of this kind; [`Error::TooLarge`] above the limits.
-    fn read(bytes: &[u8], name: &str, how: Option<Self::How>, limits: &AssetLimits) -> Result<Self>;
-    /// All that is told of it.
-    fn info(&self, id: &str) -> Self::Info;
-    /// What is told of it in lists.
-    fn brief(&self, id: &str) -> Self::Info;
-    /// Its id, where it has one, and its name.
-    fn id_and_name(info: &Self::Info) -> (Option<&str>, &str);
-    /// The extension of its file, after its content: letters, digits and points.
-    fn extension(&self, bytes: &[u8]) -> &'static str;
-}
 
 /// Uploads of one kind.
 pub struct Store<A: Asset> {
     folder: Folder,
     limits: AssetLimits,
-    records: Mutex<BTreeMap<String, Record<A>>>,
+    records: Mutex<Records<A>>,
     cache: SharedCache,
     /// Held while one is decoded or written: one at a time, so that many requests together take no more memory than one, and the same content
     /// sent twice at once is stored once. Taken before the others, never after.
@@ -54,7 +28,7 @@ impl<A: Asset> Store<A> {
     /// [`Error::Internal`] if the folder cannot be used.
     pub(super) fn open(dir: &Path, limits: AssetLimits, cache: SharedCache) -> Result<Self> {
         let (folder, records) = Folder::open::<A>(dir)?;
-        Ok(Self { folder, limits, records: Mutex::new(records.into_iter().collect()), cache, working: Mutex::new(()) })
+        Ok(Self { folder, limits, records: Mutex::new(records), cache, working: Mutex::new(()) })
     }
 
     /// Reads and keeps an upload. Returns it with its id, and whether it is new: the same content, read in the same way, is one, under the

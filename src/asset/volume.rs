@@ -1,6 +1,8 @@
 //! Volumes as assets.
 
-use super::{Asset, AssetLimits, Resident};
+use super::AssetLimits;
+use super::cache::Resident;
+use super::kind::Asset;
 use crate::error::Result;
 use crate::volume::{RawParams, Volume, VolumeInfo, is_gzip, read};
 

@@ -18,15 +18,6 @@ pub struct Client {
     token: Option<String>,
 }
 
-/// A frame's numbers as an event tells them.
-#[derive(Debug, Clone)]
-pub struct Progress {
-    /// Samples per pixel so far.
-    pub samples: u64,
-    /// The error, once it is known.
-    pub error: Option<f64>,
-}
-
 impl Client {
     /// A client of the server at `base`, such as `http://127.0.0.1:8080`.
     ///
@@ -80,35 +71,37 @@ impl Client {
         reply["id"].as_str().map(str::to_owned).ok_or_else(|| Error::internal("the server gave no id"))
     }
 
-    /// Posts a render and follows it to its end; returns the last frame as PNG, or `exr`, and the render resource.
+    /// Posts a render or an export to `path` and follows it to its end, event by event; returns what its `link` leads to, and its resource.
     ///
     /// # Errors
-    /// The server's refusal in its words, or how the render ended otherwise.
-    pub async fn render(
+    /// The server's refusal in its words, or how it ended otherwise.
+    pub async fn run(
         &self,
-        scene: &Value,
-        exr: bool,
-        mut progress: impl FnMut(&Progress),
+        path: &str,
+        request: &Value,
+        link: &str,
+        mut event: impl FnMut(&Value),
     ) -> Result<(Vec<u8>, Value)> {
-        let body = scene.to_string().into_bytes();
-        let reply = self.send(reqwest::Method::POST, "/v1/renders", Some(body.into()), "application/json").await?;
+        let body = request.to_string().into_bytes();
+        let reply = self.send(reqwest::Method::POST, path, Some(body.into()), "application/json").await?;
         let reply: Value = reply.json().await.map_err(Error::internal)?;
-        let path =
-            reply["links"]["self"].as_str().ok_or_else(|| Error::internal("the server gave no link"))?.to_owned();
-        let events = self.send(reqwest::Method::GET, &format!("{path}/events"), None, "").await?;
-        self.follow(events, &mut progress).await?;
-        let resource: Value =
-            self.send(reqwest::Method::GET, &path, None, "").await?.json().await.map_err(Error::internal)?;
+        let to = |link: &str| {
+            let found = reply["links"][link].as_str().map(str::to_owned);
+            found.ok_or_else(|| Error::internal("the server gave no link"))
+        };
+        let events = self.send(reqwest::Method::GET, &to("events")?, None, "").await?;
+        self.follow(events, &mut event).await?;
+        let resource = self.send(reqwest::Method::GET, &to("self")?, None, "").await?;
+        let resource: Value = resource.json().await.map_err(Error::internal)?;
         if resource["state"] != "done" {
-            return Err(Error::Conflict(format!("the render is {}: {}", resource["state"], resource["failure"])));
+            return Err(Error::Conflict(format!("it is {}: {}", resource["state"], resource["failure"])));
         }
-        let name = if exr { "frame.exr" } else { "frame.png" };
-        let picture = self.send(reqwest::Method::GET, &format!("{path}/{name}"), None, "").await?;
-        Ok((picture.bytes().await.map_err(Error::internal)?.to_vec(), resource))
+        let made = self.send(reqwest::Method::GET, &to(link)?, None, "").await?;
+        Ok((made.bytes().await.map_err(Error::internal)?.to_vec(), resource))
     }
 
     /// Reads server-sent events until the stream ends.
-    async fn follow(&self, events: reqwest::Response, progress: &mut impl FnMut(&Progress)) -> Result<()> {
+    async fn follow(&self, events: reqwest::Response, told: &mut impl FnMut(&Value)) -> Result<()> {
         let mut pending = String::new();
         let mut stream = events.bytes_stream();
         while let Some(piece) = stream.next().await {
@@ -117,7 +110,7 @@ impl Client {
                 let event: String = pending.drain(..end + 2).collect();
                 let Some(data) = event.lines().find_map(|l| l.strip_prefix("data: ")) else { continue };
                 let Ok(data) = serde_json::from_str::<Value>(data) else { continue };
-                progress(&Progress { samples: data["samples"].as_u64().unwrap_or(0), error: data["error"].as_f64() });
+                told(&data);
             }
         }
         Ok(())

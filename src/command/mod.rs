@@ -1,19 +1,23 @@
-//! The command line: `serve`, `render`, `study`, `device`, `healthcheck`, each in its own file.
+//! The command line: `serve`, `render`, `export`, `study`, `device`, `healthcheck`, each in its own file.
 
 mod client;
 mod devices;
+mod export;
 mod render;
 mod serve;
 mod study;
 
 use std::net::SocketAddr;
+use std::path::Path;
 
 use clap::{Parser, Subcommand};
+use serde_json::{Value, json};
 
 use crate::config::{Config, DeviceArgs};
 use crate::device;
 use crate::error::{Error, Result};
 use crate::run::compile_kernels;
+use crate::service::Service;
 
 /// Volume renders as a service: each frame says how accurate it is and what it cost.
 #[derive(Parser)]
@@ -29,6 +33,8 @@ enum Command {
     Serve(Box<Config>),
     /// Render a scene (the JSON of POST /v1/renders) to a PNG
     Render(Box<render::Arguments>),
+    /// Turn a volume or a field into a file (the JSON of POST /v1/exports)
+    Export(Box<export::Arguments>),
     /// Measure speed against accuracy: every technique against truths that it had no part in
     Study(Box<study::Arguments>),
     /// Show the OpenCL devices here and the one that would be used
@@ -44,6 +50,21 @@ enum Command {
     },
 }
 
+/// The JSON of a file, or of standard input for `-`.
+fn read_json(path: &Path) -> Result<Value> {
+    let text =
+        if path == Path::new("-") { std::io::read_to_string(std::io::stdin()) } else { std::fs::read_to_string(path) };
+    let text = text.map_err(|e| Error::Malformed(format!("{}: {e}", path.display())))?;
+    serde_json::from_str(&text).map_err(|e| Error::Malformed(format!("{}: {e}", path.display())))
+}
+
+/// Stores a volume file and returns what goes under `volume`.
+fn insert(service: &Service, path: &Path) -> Result<Value> {
+    let bytes = std::fs::read(path).map_err(|e| Error::Malformed(format!("{}: {e}", path.display())))?;
+    let name = path.file_name().map_or_else(|| "volume".into(), |n| n.to_string_lossy().into_owned());
+    Ok(json!({"id": service.assets().volumes().insert(bytes, &name, None)?.1}))
+}
+
 /// Runs what the command line asks for. Must be called before any other thread is started.
 ///
 /// # Errors
@@ -54,6 +75,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
     let device = match &command {
         Command::Serve(config) => Some(&config.device),
         Command::Render(args) => Some(&args.device),
+        Command::Export(args) => Some(&args.device),
         Command::Study(args) => Some(&args.device),
         Command::Device(args) => Some(&args.device),
         Command::Compile(device) => Some(&**device),
@@ -67,6 +89,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
         match command {
             Command::Serve(config) => serve::serve(*config).await,
             Command::Render(args) => render::render(&args).await,
+            Command::Export(args) => export::export(&args).await,
             Command::Study(args) => {
                 tokio::task::spawn_blocking(move || study::study(&args)).await.map_err(Error::internal)?
             }

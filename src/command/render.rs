@@ -1,11 +1,12 @@
 //! `render`: a scene to a picture, here or by a server.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 
 use super::client::Client;
+use super::{insert, read_json};
 use crate::config::{DeviceArgs, Limits};
 use crate::error::{Error, Result};
 use crate::job::State;
@@ -40,13 +41,6 @@ impl Arguments {
     }
 }
 
-fn read_scene(path: &Path) -> Result<Value> {
-    let text =
-        if path == Path::new("-") { std::io::read_to_string(std::io::stdin()) } else { std::fs::read_to_string(path) };
-    let text = text.map_err(|e| Error::Malformed(format!("{}: {e}", path.display())))?;
-    serde_json::from_str(&text).map_err(|e| Error::Malformed(format!("{}: {e}", path.display())))
-}
-
 fn bar(scene: &Value) -> ProgressBar {
     let samples = scene.pointer("/budget/samples").and_then(Value::as_u64).unwrap_or(16);
     let style = ProgressStyle::with_template("{bar:30} {pos}/{len} samples  {msg}  {elapsed}");
@@ -58,7 +52,7 @@ fn bar(scene: &Value) -> ProgressBar {
 /// # Errors
 /// Those of the scene, of its file, and of the server where one is named.
 pub(super) async fn render(args: &Arguments) -> Result<()> {
-    let mut scene = read_scene(&args.scene)?;
+    let mut scene = read_json(&args.scene)?;
     let (bytes, report) = match &args.server {
         Some(server) => render_there(args, server, &mut scene).await?,
         None => render_here(args, &mut scene).await?,
@@ -81,10 +75,11 @@ async fn render_there(args: &Arguments, server: &str, scene: &mut Value) -> Resu
         scene["volume"] = json!({"id": client.upload(path).await?});
     }
     let bar = bar(scene);
+    let link = if args.wants_exr() { "exr" } else { "png" };
     let done = client
-        .render(scene, args.wants_exr(), |p| {
-            bar.set_position(p.samples);
-            bar.set_message(p.error.map_or(String::new(), |e| format!("error {:.3} %", 100.0 * e)));
+        .run("/v1/renders", scene, link, |event| {
+            bar.set_position(event["samples"].as_u64().unwrap_or(0));
+            bar.set_message(event["error"].as_f64().map_or(String::new(), |e| format!("error {:.3} %", 100.0 * e)));
         })
         .await;
     bar.finish();
@@ -95,9 +90,7 @@ async fn render_there(args: &Arguments, server: &str, scene: &mut Value) -> Resu
 async fn render_here(args: &Arguments, scene: &mut Value) -> Result<(Vec<u8>, Value)> {
     let service = Service::start(args.device.device_config(), &args.device.data_dir(), args.limits.clone())?;
     if let Some(path) = &args.volume {
-        let bytes = std::fs::read(path).map_err(|e| Error::Malformed(format!("{}: {e}", path.display())))?;
-        let name = path.file_name().map_or_else(|| "volume".into(), |n| n.to_string_lossy().into_owned());
-        scene["volume"] = json!({"id": service.assets().volumes().insert(bytes, &name, None)?.1});
+        scene["volume"] = insert(&service, path)?;
     }
     service.engine().ready().await?;
     let job = service.submit(scene.take()).await?;

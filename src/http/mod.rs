@@ -1,6 +1,7 @@
 //! The HTTP side: routes, negotiation, problem documents, streams. No physics, and the only home of axum.
 
 mod accept;
+mod exports;
 mod frames;
 mod guard;
 mod idempotency;
@@ -59,7 +60,13 @@ impl App {
     /// The render of an id.
     fn render(&self, id: &str) -> Result<Arc<Job>> {
         let missing = || Error::NotFound { what: "render", id: id.chars().take(64).collect() };
-        self.service.engine().job(id).ok_or_else(missing)
+        self.service.engine().job(id).filter(|job| job.is_render()).ok_or_else(missing)
+    }
+
+    /// The export of an id.
+    fn export(&self, id: &str) -> Result<Arc<Job>> {
+        let missing = || Error::NotFound { what: "export", id: id.chars().take(64).collect() };
+        self.service.engine().job(id).filter(|job| !job.is_render()).ok_or_else(missing)
     }
 
     /// The idempotency keys.

@@ -132,6 +132,29 @@ const OPERATIONS: &[Operation] = &[
     get("/v1/renders/{id}/convergence.svg", "Its error against time", &[(200, "image/svg+xml", "A chart")], &[404]),
     Operation {
         method: "post",
+        path: "/v1/exports",
+        words: "Start an export: a technique that turns a volume or a field into a file",
+        body: Body::Json("ExportRequest"),
+        answers: &[(202, JSON, "The export resource; Location names it")],
+        problems: &[400, 408, 413, 415, 422, 429, 503],
+    },
+    get("/v1/exports", "The exports that are kept, newest first", &[(200, JSON, "A list of summaries")], &[]),
+    get("/v1/exports/{id}", "State, progress, result, what the file is", &[(200, JSON, "The export resource")], &[404]),
+    delete("/v1/exports/{id}", "Cancel; the resource stays readable", &[(200, JSON, "The export resource")], &[404]),
+    get(
+        "/v1/exports/{id}/file",
+        "The file; ?wait=final waits for it",
+        &[(200, "text/csv", "What a histogram makes")],
+        &[404, 409, 422, 429],
+    ),
+    get(
+        "/v1/exports/{id}/events",
+        "Server-sent events: progress, final, cancelled, failed; Last-Event-ID resumes",
+        &[(200, "text/event-stream", "Events")],
+        &[404, 429],
+    ),
+    Operation {
+        method: "post",
         path: "/v1/volumes",
         words: "Upload a volume: NIfTI-1, NRRD, or raw with ?dims=…&type=…&spacing=…; the id is the content's hash",
         body: Body::Bytes,
@@ -202,7 +225,7 @@ fn describe(operation: &Operation) -> Value {
         names.map(|n| json!({"name": n, "in": "path", "required": true, "schema": {"type": "string"}}));
     let mut parameters: Vec<Value> = path_parameters.collect();
     let mut query = |name: &str, schema: Value| parameters.push(json!({"name": name, "in": "query", "schema": schema}));
-    if operation.path.contains("/frame.") {
+    if operation.path.contains("/frame.") || operation.path.ends_with("/file") {
         query("wait", json!({"enum": ["final"]}));
     }
     if operation.path.ends_with("/difference") {
@@ -242,7 +265,7 @@ pub(super) async fn document(State(app): State<App>) -> Json<Value> {
         "paths": paths,
         "components": {
             "schemas": {
-                "RenderRequest": render::schema(app.service.limits()), "Camera": schema_of::<CameraRequest>(),
+                "RenderRequest": render::schema(app.service.limits()), "ExportRequest": render::export_schema(app.service.limits()), "Camera": schema_of::<CameraRequest>(),
                 "Volume": schema_of::<VolumeInfo>(), "Problem": problem,
             },
             "responses": {"Problem": {

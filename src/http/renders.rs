@@ -73,7 +73,8 @@ async fn finished(app: &App, job: Arc<Job>, fresh: bool, format: &str) -> Result
 
 /// `GET /v1/renders`.
 pub(super) async fn list(State(app): State<App>) -> Json<Value> {
-    Json(json!({"renders": app.service.engine().list().iter().map(|j| j.summary()).collect::<Vec<_>>()}))
+    let renders = app.service.engine().list().into_iter().filter(|job| job.is_render());
+    Json(json!({"renders": renders.map(|job| job.summary()).collect::<Vec<_>>()}))
 }
 
 /// `GET /v1/renders/{id}`.

@@ -13,7 +13,7 @@ use tower_http::cors::{AllowOrigin, Any, CorsLayer};
 use tower_http::trace::TraceLayer;
 
 use super::guard::{self, Tokens};
-use super::{App, frames, info, openapi, plans, problem, renders, streams, studies, viewer, volumes};
+use super::{App, exports, frames, info, openapi, plans, problem, renders, streams, studies, viewer, volumes};
 use crate::error::{Error, Result};
 
 /// Every route with its layers.
@@ -29,6 +29,10 @@ pub(super) fn router(app: App, tokens: Tokens, origins: &[String]) -> Result<Rou
         .route("/v1/renders/{id}/field", get(renders::field))
         .route("/v1/renders/{id}/events", get(streams::events))
         .route("/v1/renders/{id}/convergence.svg", get(renders::convergence))
+        .route("/v1/exports", post(exports::create).get(exports::list))
+        .route("/v1/exports/{id}", get(exports::show).delete(exports::cancel))
+        .route("/v1/exports/{id}/file", get(exports::file))
+        .route("/v1/exports/{id}/events", get(streams::export_events))
         .route("/v1/volumes", post(volumes::create).get(volumes::list))
         .route("/v1/volumes/{id}", get(volumes::show).delete(volumes::delete))
         .route("/v1/plan", post(plans::plan))

@@ -41,14 +41,14 @@ impl Reader {
         Ok(Self { updates: job.watch(), job, stop: app.stop.clone(), shown, over: false, _permit, _guard: guard })
     }
 
-    /// The next update with a frame not shown yet or an end; `None` after the end or when the server stops.
+    /// The next update with what is not shown yet, or an end; `None` after the end or when the server stops.
     async fn next(&mut self) -> Option<Update> {
         while !self.over {
             let update = self.updates.borrow_and_update().clone();
-            let fresh = update.frame.as_ref().is_some_and(|f| f.sequence > self.shown);
+            let fresh = update.sequence() > self.shown;
             self.over = update.state.is_terminal();
             if fresh || self.over {
-                self.shown = update.frame.as_ref().map_or(self.shown, |f| f.sequence);
+                self.shown = self.shown.max(update.sequence());
                 return Some(update);
             }
             tokio::select! {
@@ -109,6 +109,11 @@ fn event(job: &Job, update: &Update) -> Event {
     };
     let resource = job.resource();
     let frame = update.frame.as_ref();
+    let id = update.sequence().to_string();
+    if !job.is_render() {
+        let data = json!({"state": update.state, "progress": resource["progress"], "failure": resource["failure"]});
+        return Event::default().event(name).id(id).data(data.to_string());
+    }
     let data = json!({
         "state": update.state,
         "samples": frame.map_or(0, |f| f.samples),
@@ -120,14 +125,22 @@ fn event(job: &Job, update: &Update) -> Event {
         "stopped_by": resource["stopped_by"],
         "failure": resource["failure"],
     });
-    Event::default().event(name).id(frame.map_or(0, |f| f.sequence).to_string()).data(data.to_string())
+    Event::default().event(name).id(id).data(data.to_string())
 }
 
 /// `GET /v1/renders/{id}/events`; `Last-Event-ID` says what was seen before.
 pub(super) async fn events(State(app): State<App>, Id(id): Id, headers: HeaderMap) -> Result<Response> {
-    let job = app.render(&id)?;
+    events_of(&app, app.render(&id)?, &headers)
+}
+
+/// `GET /v1/exports/{id}/events`, likewise.
+pub(super) async fn export_events(State(app): State<App>, Id(id): Id, headers: HeaderMap) -> Result<Response> {
+    events_of(&app, app.export(&id)?, &headers)
+}
+
+fn events_of(app: &App, job: Arc<Job>, headers: &HeaderMap) -> Result<Response> {
     let seen = headers.get("last-event-id").and_then(|v| v.to_str().ok()?.parse().ok()).unwrap_or(0);
-    let reader = Reader::new(&app, job, seen, None)?;
+    let reader = Reader::new(app, job, seen, None)?;
     let events = stream::unfold(reader, |mut reader| async move {
         let update = reader.next().await?;
         Some((Ok::<_, Infallible>(event(&reader.job, &update)), reader))

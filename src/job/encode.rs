@@ -27,7 +27,8 @@ pub(super) async fn frames(job: Weak<Job>, ended: impl Fn(&Arc<Job>)) {
             changed = updates.changed() => if changed.is_err() { return },
         }
         let Some(job) = job.upgrade() else { return };
-        if matches!(updates.borrow_and_update().state, State::Cancelled | State::Failed) {
+        let state = updates.borrow_and_update().state;
+        if matches!(state, State::Cancelled | State::Failed) || (state == State::Done && !job.is_render()) {
             ended(&job);
             return;
         }
@@ -116,7 +117,7 @@ impl Job {
             device_ms: snapshot.device_ms,
             is_final: ends,
         });
-        self.updates.send_replace(Update { state: progress.state, frame: Some(frame) });
+        self.updates.send_replace(Update { state: progress.state, frame: Some(frame), work: None });
         ends
     }
 }

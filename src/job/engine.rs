@@ -9,7 +9,7 @@ use serde_json::Value;
 use tokio::sync::oneshot;
 
 use super::executor::{Executor, KernelProgress, Readiness};
-use super::{Job, State, encode};
+use super::{Job, State, Task, encode};
 use crate::config::Limits;
 use crate::device::{DeviceInfo, NO_DEVICE};
 use crate::error::{Error, Result};
@@ -137,16 +137,16 @@ impl Engine {
         Ok(Place { engine: self.clone(), taken: false })
     }
 
-    /// Queues a render. `request` is kept to be shown again, and so is what the planner said of it.
-    pub fn submit(&self, mut place: Place, request: Value, scene: Scene, planned: Option<Value>) -> Arc<Job> {
+    /// Queues a render or an export. `request` is kept to be shown again, and so is what the planner said of it.
+    pub fn submit(&self, mut place: Place, request: Value, task: Task, planned: Option<Value>) -> Arc<Job> {
         place.taken = true;
-        self.start_job(Job::new(request, scene, planned, false))
+        self.start_job(Job::new(request, task, planned, false))
     }
 
     /// Queues a render that nobody sees but the caller: it is not listed, and forgotten when it ends. It takes no place of its own: the
     /// plan that it is for holds one.
     pub fn submit_pilot(&self, scene: Scene) -> Arc<Job> {
-        self.start_job(Job::new(Value::Null, scene, None, true))
+        self.start_job(Job::new(Value::Null, Task::Picture(Box::new(scene)), None, true))
     }
 
     fn start_job(&self, job: Arc<Job>) -> Arc<Job> {
@@ -193,7 +193,7 @@ impl Engine {
         job.cancel();
     }
 
-    /// The render of an id.
+    /// The render or export of an id.
     pub fn job(&self, id: &str) -> Option<Arc<Job>> {
         self.jobs().by_id.get(id).filter(|j| !j.is_pilot()).cloned()
     }
@@ -209,7 +209,7 @@ impl Engine {
         film.await.map_err(|_| gone())?.map(Arc::new)
     }
 
-    /// Every render that is kept, newest first.
+    /// Every render and export that is kept, newest first.
     pub fn list(&self) -> Vec<Arc<Job>> {
         let mut all: Vec<_> = self.jobs().by_id.values().filter(|j| !j.is_pilot()).cloned().collect();
         all.sort_by_key(|j| std::cmp::Reverse((j.created_unix_s, j.lock().asked)));

@@ -1,4 +1,4 @@
-//! The record of a render: its request, its state, its events, its reply, and what an executor tells it. The engine admits jobs to a
+//! The record of a render or an export: its request, its state, its events, its reply, and what an executor tells it. The engine admits jobs to a
 //! queue, keeps them readable and hands them to an [`Executor`]; how they are worked on is none of its business.
 //!
 //! A [`Job`] is what the HTTP side and the executor share. The executor leaves snapshots of the film; a task of the async runtime encodes
@@ -8,6 +8,7 @@ mod cancel;
 mod encode;
 mod engine;
 mod executor;
+mod export;
 mod progress;
 mod report;
 mod resource;
@@ -21,7 +22,7 @@ use serde_json::Value;
 use tokio::sync::watch;
 
 use crate::error::{Error, Result};
-use crate::render::Scene;
+use crate::render::{ExportTask, Scene};
 use crate::scene::camera::Camera;
 
 pub use cancel::CancelOnDrop;
@@ -40,7 +41,16 @@ pub(crate) struct Restart {
     pub was_done: bool,
 }
 
-/// One render.
+/// What a job makes.
+#[derive(Clone)]
+pub enum Task {
+    /// A picture that gets better: a render.
+    Picture(Box<Scene>),
+    /// A file: an export.
+    File(Box<ExportTask>),
+}
+
+/// One render or export.
 pub struct Job {
     id: String,
     request: Value,
@@ -62,7 +72,7 @@ pub struct Job {
 }
 
 impl Job {
-    pub(crate) fn new(request: Value, scene: Scene, planned: Option<Value>, pilot: bool) -> Arc<Self> {
+    pub(crate) fn new(request: Value, task: Task, planned: Option<Value>, pilot: bool) -> Arc<Self> {
         Arc::new(Self {
             id: uuid::Uuid::new_v4().simple().to_string(),
             request,
@@ -73,8 +83,8 @@ impl Job {
             final_only: AtomicBool::new(pilot),
             film_wanted: AtomicBool::new(pilot),
             encoding: AtomicBool::new(false),
-            progress: Mutex::new(Progress::new(scene)),
-            updates: watch::Sender::new(Update { state: State::Queued, frame: None }),
+            progress: Mutex::new(Progress::new(task)),
+            updates: watch::Sender::new(Update { state: State::Queued, frame: None, work: None }),
             snapshots: watch::Sender::new(None),
         })
     }
@@ -99,8 +109,16 @@ impl Job {
     /// [`Error::Invalid`] naming the field.
     pub fn camera_from_json(&self, body: &Value) -> Result<Camera> {
         // A copy: checking takes a while, and the executor wants the lock.
-        let scene = self.lock().scene.clone();
-        scene.camera_from_json(body)
+        let task = self.lock().task.clone();
+        match task {
+            Task::Picture(scene) => scene.camera_from_json(body),
+            Task::File(_) => Err(Error::internal("an export has no camera")),
+        }
+    }
+
+    /// True if it makes a picture, and not a file.
+    pub fn is_render(&self) -> bool {
+        matches!(self.lock().task, Task::Picture(_))
     }
 
     /// Where it stands.
@@ -179,7 +197,9 @@ impl Job {
         if matches!(progress.state, State::Cancelled | State::Failed) {
             return Err(Error::Conflict("this render was cancelled or has failed; post a new one".into()));
         }
-        progress.scene.set_camera(camera);
+        if let Task::Picture(scene) = &mut progress.task {
+            scene.set_camera(camera);
+        }
         progress.generation += 1;
         progress.asked = Instant::now();
         progress.trace.clear();
@@ -204,7 +224,9 @@ impl Job {
     pub(crate) fn bytes(&self) -> usize {
         let frame = self.updates.borrow().frame.as_ref().map_or(0, |f| f.png.len());
         let progress = self.lock();
-        frame + progress.field.as_ref().map_or(0, |f| f.bytes() as usize)
+        frame
+            + progress.field.as_ref().map_or(0, |f| f.bytes() as usize)
+            + progress.file.as_ref().map_or(0, |f| f.bytes.len())
     }
 
     /// The request as it was posted, with what the planner put in.

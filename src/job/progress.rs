@@ -7,10 +7,11 @@ use std::time::Instant;
 use serde_json::Value;
 
 use super::report::{Counts, State, Timings, TracePoint};
-use super::{Job, Snapshot};
+use super::{Job, Snapshot, Task};
 use crate::error::Error;
 use crate::film::ErrorEstimate;
 use crate::render::Scene;
+use crate::technique::{self, File};
 use crate::volume::Volume;
 
 /// What changes while a job lives. One lock, held for moments.
@@ -20,7 +21,7 @@ pub(super) struct Progress {
     pub generation: u64,
     /// When the render, or its newest camera, was asked for.
     pub asked: Instant,
-    pub scene: Scene,
+    pub task: Task,
     /// True if the engine holds the job; a new camera for one that it does not hold is submitted again.
     pub in_engine: bool,
     pub reasons: Vec<String>,
@@ -45,15 +46,18 @@ pub(super) struct Progress {
     /// The field once all its histories are in it: a new camera looks at it again.
     pub complete_field: Option<Arc<Volume>>,
     pub sequence: u64,
+    /// How much of an export is done, and its file at the end.
+    pub work: Option<technique::Progress>,
+    pub file: Option<Arc<File>>,
 }
 
 impl Progress {
-    pub fn new(scene: Scene) -> Self {
+    pub fn new(task: Task) -> Self {
         Self {
             state: State::Queued,
             generation: 0,
             asked: Instant::now(),
-            scene,
+            task,
             in_engine: true,
             reasons: Vec::new(),
             warnings: Vec::new(),
@@ -72,6 +76,8 @@ impl Progress {
             field_ms: 0.0,
             complete_field: None,
             sequence: 0,
+            work: None,
+            file: None,
         }
     }
 }
@@ -93,10 +99,11 @@ impl Job {
     /// The newest camera, unless it is that of generation `seen`.
     pub(crate) fn newest_camera(&self, seen: Option<u64>) -> Option<NewestCamera> {
         let mut progress = self.lock();
+        let Task::Picture(scene) = progress.task.clone() else { return None };
         (Some(progress.generation) != seen).then(|| NewestCamera {
             generation: progress.generation,
             asked: progress.asked,
-            scene: progress.scene.clone(),
+            scene: *scene,
             frame_ms: progress.frame_ms.take(),
             complete_field: progress.complete_field.clone(),
         })

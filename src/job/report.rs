@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::film::{ErrorEstimate, Lowered};
 use crate::power_law::PowerLaw;
+use crate::technique::Progress;
 
 /// Where a render stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -86,6 +87,16 @@ pub struct Update {
     pub state: State,
     /// The latest frame, if there is one.
     pub frame: Option<Arc<Frame>>,
+    /// How much of an export is done.
+    pub work: Option<Progress>,
+}
+
+impl Update {
+    /// The number of what there is to show, which rises: of the frame, or how much of an export is done.
+    pub fn sequence(&self) -> u64 {
+        let of_work = self.work.map(|work| work.done);
+        self.frame.as_ref().map(|frame| frame.sequence).or(of_work).unwrap_or(0)
+    }
 }
 
 /// One encoded frame and what it says of itself.

@@ -1,41 +1,64 @@
-//! The render resource of the HTTP contract.
+//! The resources of the HTTP contract: of a render here, of an export in `export.rs`.
 
 use serde_json::{Value, json};
 
-use super::Job;
+use super::progress::Progress;
+use super::{Job, Task};
 use crate::error::Error;
+use crate::render::Scene;
 
-impl Job {
-    /// A line of `GET /v1/renders`.
-    pub fn summary(&self) -> Value {
-        let p = self.lock();
-        json!({
-            "id": self.id, "state": p.state, "technique": p.scene.technique().name, "image": p.scene.image(),
-            "samples": p.samples, "error": p.error.map(|e| e.total), "created_unix_s": self.created_unix_s,
+impl Progress {
+    /// What it failed by, in words for a client.
+    pub(super) fn failure_words(&self) -> Option<String> {
+        self.failure.as_ref().map(|error| match error {
+            Error::Internal(_) => "the render failed on the server".to_owned(),
+            other => other.to_string(),
         })
     }
+}
 
-    /// The render resource.
+impl Job {
+    /// A line of `GET /v1/renders` or `/v1/exports`.
+    pub fn summary(&self) -> Value {
+        let p = self.lock();
+        match &p.task {
+            Task::Picture(scene) => json!({
+                "id": self.id, "state": p.state, "technique": scene.technique().name, "image": scene.image(),
+                "samples": p.samples, "error": p.error.map(|e| e.total), "created_unix_s": self.created_unix_s,
+            }),
+            Task::File(task) => json!({
+                "id": self.id, "state": p.state, "technique": task.technique().name,
+                "created_unix_s": self.created_unix_s,
+            }),
+        }
+    }
+
+    /// The resource.
     pub fn resource(&self) -> Value {
         let p = self.lock();
+        match &p.task {
+            Task::Picture(scene) => self.render_resource(&p, scene),
+            Task::File(task) => self.export_resource(&p, task),
+        }
+    }
+
+    fn render_resource(&self, p: &Progress, scene: &Scene) -> Value {
         let path = |rest: &str| format!("/v1/renders/{}{rest}", self.id);
+        let (technique, budget) = (scene.technique().name, scene.budget());
         json!({
             "id": self.id,
             "state": p.state,
-            "technique": p.scene.technique().name,
+            "technique": technique,
             "request": self.request,
-            "camera": p.scene.camera().to_json(),
-            "image": {"width": p.scene.image()[0], "height": p.scene.image()[1]},
-            "plan": {"technique": p.scene.technique().name, "reasons": p.reasons, "planned": self.planned, "budget": {
-                "samples": p.scene.budget().samples, "time_ms": p.scene.budget().time_ms, "max_error": p.scene.budget().max_error}},
+            "camera": scene.camera().to_json(),
+            "image": {"width": scene.image()[0], "height": scene.image()[1]},
+            "plan": {"technique": technique, "reasons": p.reasons, "planned": self.planned, "budget": {
+                "samples": budget.samples, "time_ms": budget.time_ms, "max_error": budget.max_error}},
             "samples": p.samples,
             "error": p.error.map(|e| e.total),
             "error_parts": p.error,
             "stopped_by": p.stopped_by,
-            "failure": p.failure.as_ref().map(|error| match error {
-                Error::Internal(_) => "the render failed on the server".to_owned(),
-                other => other.to_string(),
-            }),
+            "failure": p.failure_words(),
             "waits_for": p.waits_for.as_ref().map(|kernel| json!({"kernel": kernel})),
             "timings": p.timings,
             "counts": p.counts,

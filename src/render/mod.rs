@@ -1,6 +1,7 @@
 //! The validated request: what a render looks at, from where, how, and when it stops. Fields are private: what a [`Scene`] holds has been
 //! checked, and nothing downstream checks again.
 
+mod export;
 pub(crate) mod region;
 mod schema;
 mod shared;
@@ -19,6 +20,7 @@ use crate::scene::camera::Camera;
 use crate::scene::clip::Clip;
 use crate::technique::{self, Kind, PreparedView, Setting, Subject, Technique, View};
 use crate::volume::Volume;
+pub use export::{ExportTask, export_schema};
 use region::Region;
 pub use schema::{parameters_schema, schema};
 use shared::{own_parameters, where_it_was_given};

@@ -21,6 +21,15 @@ pub fn schema(limits: &Limits) -> &'static Value {
     request::kept(&format!("{limits:?}"), || make_schema(limits))
 }
 
+/// The schema of a request with the fields that may stand under its `volume`.
+pub(super) fn with_fields(mut schema: Value, limits: &Limits) -> Value {
+    schema["properties"]["volume"]["additionalProperties"] = false.into();
+    for t in technique::fields() {
+        schema["properties"]["volume"]["properties"][t.name] = parameters_schema(t, limits);
+    }
+    schema
+}
+
 fn make_schema(limits: &Limits) -> Value {
     let mut schema = request::schema_of::<RenderRequest>().clone();
     let names: Vec<&str> = technique::views().map(|t| t.name).collect();
@@ -33,10 +42,7 @@ fn make_schema(limits: &Limits) -> Value {
             schema["properties"][name] = (t.schema)()["properties"][name].clone();
         }
     }
-    schema["properties"]["volume"]["additionalProperties"] = false.into();
-    for t in technique::fields() {
-        schema["properties"]["volume"]["properties"][t.name] = parameters_schema(t, limits);
-    }
+    schema = with_fields(schema, limits);
     for side in ["width", "height"] {
         schema["properties"]["image"]["properties"][side]["maximum"] = limits.max_image_side.into();
     }

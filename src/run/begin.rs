@@ -10,6 +10,7 @@ use super::view_run::ViewRun;
 use crate::device::cells;
 use crate::device::program::Variant;
 use crate::error::Result;
+use crate::job::Job;
 use crate::render::Scene;
 use crate::technique::{AskedField, PreparedView};
 use crate::volume::Volume;
@@ -55,25 +56,10 @@ impl Live {
         }
     }
 
-    /// True if kernels are ready. Those that are not are asked for, and the job says that it waits for the first of them.
-    fn is_ready(&self, context: &mut DeviceContext, variants: &[Variant]) -> Result<bool> {
-        let mut missing = None;
-        for variant in variants {
-            if !context.is_ready(variant)? {
-                missing.get_or_insert(variant);
-            }
-        }
-        match missing {
-            Some(variant) => self.job.waits_for(variant.label()),
-            None => self.job.started(),
-        }
-        Ok(missing.is_none())
-    }
-
     pub(super) fn begin_field(&mut self, context: &mut DeviceContext) -> Result<()> {
         let asked = self.camera.as_ref().and_then(|camera| camera.scene.subject().field().cloned());
         let Some(AskedField { field, .. }) = asked else { return Ok(()) };
-        if !self.is_ready(context, &field.kernels()?)? {
+        if !is_ready(context, &self.job, &field.kernels()?)? {
             self.stage = Stage::AwaitsField;
             return Ok(());
         }
@@ -96,7 +82,7 @@ impl Live {
     pub(super) fn run_view(&mut self, context: &mut DeviceContext, prepared: Arc<dyn PreparedView>) -> Result<()> {
         let mut kernels = vec![prepared.plan().variant];
         kernels.extend(prepared.volume().into_iter().flat_map(|volume| cells::needed(volume.voxel_type())));
-        if !self.is_ready(context, &kernels)? {
+        if !is_ready(context, &self.job, &kernels)? {
             self.stage = Stage::AwaitsView(prepared);
             return Ok(());
         }
@@ -130,4 +116,19 @@ impl Live {
         warnings.extend(simulated.into_iter().flatten().cloned());
         self.job.set_warnings(warnings, non_finite_voxels);
     }
+}
+
+/// True if kernels are ready. Those that are not are asked for, and the job says that it waits for the first of them.
+pub(super) fn is_ready(context: &mut DeviceContext, job: &Job, variants: &[Variant]) -> Result<bool> {
+    let mut missing = None;
+    for variant in variants {
+        if !context.is_ready(variant)? {
+            missing.get_or_insert(variant);
+        }
+    }
+    match missing {
+        Some(variant) => job.waits_for(variant.label()),
+        None => job.started(),
+    }
+    Ok(missing.is_none())
 }

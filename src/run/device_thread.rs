@@ -8,6 +8,7 @@ use std::sync::mpsc::{Receiver, Sender};
 use tokio::sync::{oneshot, watch};
 
 use super::context::DeviceContext;
+use super::export_run::ExportRun;
 use super::kernels::Kernels;
 use super::live::{Live, Rested, Turn};
 use crate::device::{DeviceConfig, NO_DEVICE};
@@ -38,13 +39,51 @@ pub(super) struct DeviceThread {
     pub keep_film_bytes: usize,
 }
 
-/// The renders on the device thread.
+/// What is worked on in turns.
+enum Work {
+    Picture(Box<Live>),
+    File(Box<ExportRun>),
+}
+
+impl Work {
+    fn turn(&mut self, context: &mut DeviceContext) -> Result<Turn> {
+        match self {
+            Self::Picture(live) => live.turn(context),
+            Self::File(run) => run.turn(context),
+        }
+    }
+
+    fn job(&self) -> &Arc<Job> {
+        match self {
+            Self::Picture(live) => live.job(),
+            Self::File(run) => run.job(),
+        }
+    }
+
+    /// The film of a render so far, where it has one.
+    fn film(&mut self, context: &DeviceContext) -> Result<Option<Film>> {
+        match self {
+            Self::Picture(live) => live.film(context),
+            Self::File(_) => Ok(None),
+        }
+    }
+
+    /// Ends with what a render has gathered.
+    fn rest(self) -> Option<Rested> {
+        match self {
+            Self::Picture(live) => live.rest(),
+            Self::File(_) => None,
+        }
+    }
+}
+
+/// The jobs on the device thread.
 #[derive(Default)]
 struct Renders {
     waiting: VecDeque<Arc<Job>>,
-    live: VecDeque<Live>,
+    live: VecDeque<Work>,
     /// Those that wait for a kernel.
-    parked: VecDeque<Live>,
+    parked: VecDeque<Work>,
     /// What ended ones have gathered, the newest last.
     rested: Vec<Rested>,
     /// Who wants to see a film.
@@ -112,8 +151,14 @@ impl Renders {
         self.waiting.retain(|job| !job.state().is_terminal());
         while self.live.len() < most_live {
             let Some(job) = self.waiting.pop_front() else { break };
-            let rested = self.memory_for(&job, keep_film_bytes);
-            self.live.push_back(Live::new(job, rested));
+            let work = match job.export() {
+                Some(task) => Work::File(Box::new(ExportRun::new(job, task))),
+                None => {
+                    let rested = self.memory_for(&job, keep_film_bytes);
+                    Work::Picture(Box::new(Live::new(job, rested)))
+                }
+            };
+            self.live.push_back(work);
         }
         metrics::gauge!("cloudchamber_renders_live").set(self.live.len() as f64);
         metrics::gauge!("cloudchamber_renders_waiting").set((self.waiting.len() + self.parked.len()) as f64);
@@ -123,8 +168,8 @@ impl Renders {
             Ok(Ok(Turn::Again)) => self.live.push_back(current),
             Ok(Ok(Turn::Waits)) => self.parked.push_back(current),
             Ok(Ok(Turn::Over)) => self.rest(current, keep_film_bytes),
-            Ok(Err(error)) => current.fail(error),
-            Err(_) => current.fail(Error::internal("a panic on the device thread")),
+            Ok(Err(error)) => drop(current.job().fail(&error)),
+            Err(_) => drop(current.job().fail(&Error::internal("a panic on the device thread"))),
         }
     }
 
@@ -137,7 +182,7 @@ impl Renders {
     }
 
     /// Keeps what an ended render has gathered, and lets go of the oldest past the limit.
-    fn rest(&mut self, ended: Live, keep_film_bytes: usize) {
+    fn rest(&mut self, ended: Work, keep_film_bytes: usize) {
         self.forget();
         self.rested.extend(ended.rest());
         while let Some(oldest) = self.oldest(keep_film_bytes) {
@@ -160,7 +205,7 @@ impl Renders {
     /// Shows films to who asked: at once where there is something to see, else once there is; not where the render has left nothing.
     fn show(&mut self, context: &DeviceContext) {
         for (job, to) in std::mem::take(&mut self.asked) {
-            let mut live = self.live.iter_mut().chain(&mut self.parked).filter(|live| live.is_of(&job));
+            let mut live = self.live.iter_mut().chain(&mut self.parked).filter(|live| Arc::ptr_eq(live.job(), &job));
             let rested = self.rested.iter_mut().find(|rested| rested.is_of(&job));
             let waits = self.waiting.iter().any(|waiting| Arc::ptr_eq(waiting, &job));
             let film = match (live.next(), rested) {

@@ -36,7 +36,7 @@ impl<K: PartialEq, V: Clone> Kept<K, V> {
 
 /// A volume on the device.
 pub(super) struct DeviceVolume {
-    pub voxels: Buffer,
+    pub voxels: Rc<Buffer>,
     pub cells: Cells,
     /// By intervals of raw values and the overshoot, as bits.
     distances: Kept<(Vec<[u32; 2]>, u32), Distances>,
@@ -53,7 +53,7 @@ pub(super) struct Distances {
 
 impl DeviceVolume {
     pub fn new(voxels: Buffer, cells: Cells) -> Self {
-        Self { voxels, cells, distances: Kept(RefCell::default()), tables: Kept(RefCell::default()) }
+        Self { voxels: Rc::new(voxels), cells, distances: Kept(RefCell::default()), tables: Kept(RefCell::default()) }
     }
 
     pub fn bytes(&self) -> usize {

@@ -8,12 +8,12 @@ use serde_json::Value;
 use super::context::DeviceContext;
 use crate::error::Result;
 use crate::film::Film;
-use crate::technique::{Field, Process, Step};
+use crate::technique::{Field, Look, Process, Step};
 use crate::volume::Volume;
 
 /// A field at work.
 pub(super) struct FieldRun {
-    process: Box<dyn Process>,
+    process: Box<dyn Process<Look = Look>>,
     reasons: Vec<String>,
     is_over: bool,
     /// What stands under `result` in the reply, as of the last look.

@@ -8,13 +8,13 @@ use super::field_run::FieldRun;
 use super::gathered::Gathered;
 use super::motion::Motion;
 use super::view_run::ViewRun;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::film::Film;
 use crate::job::{Job, NewestCamera};
 use crate::technique::PreparedView;
 
 /// A turn of a field: its packets end at very different times, and a longer slice wastes fewer lanes on the last of them.
-const FIELD_SLICE: Duration = Duration::from_millis(40);
+pub(super) const FIELD_SLICE: Duration = Duration::from_millis(40);
 
 /// What a turn came to.
 pub(super) enum Turn {
@@ -109,8 +109,8 @@ impl Live {
         }
     }
 
-    pub fn is_of(&self, job: &Arc<Job>) -> bool {
-        Arc::ptr_eq(&self.job, job)
+    pub fn job(&self) -> &Arc<Job> {
+        &self.job
     }
 
     /// The film so far, with its pixels; none where there is nothing yet, or a pass is under way.
@@ -126,10 +126,6 @@ impl Live {
         let gathered = self.view?.gathered;
         let job = Arc::downgrade(&self.job);
         gathered.is_something().then_some(Rested { job, gathered, motion: self.motion })
-    }
-
-    pub fn fail(&self, error: Error) {
-        self.job.fail(&error);
     }
 
     /// One turn: a slice of the field or of the view.

@@ -9,6 +9,7 @@ mod context;
 mod device_thread;
 mod device_volume;
 mod distances;
+mod export_run;
 mod field_run;
 mod first;
 mod gathered;

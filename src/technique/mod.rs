@@ -2,11 +2,14 @@
 
 mod case;
 pub mod emission_absorption;
+mod export;
 mod field;
+pub mod histogram;
 pub mod isosurface;
 pub(crate) mod majorant;
 pub mod optics;
 pub mod photon_transport;
+mod process;
 pub mod projection;
 pub mod scattering;
 pub mod single_scatter;
@@ -29,13 +32,16 @@ use crate::device::program::Source;
 use crate::error::Result;
 use crate::scene::interpolation::Interpolation;
 pub use case::{Case, Cases};
-pub use field::{Field, Look, Process, Progress, Step};
+pub use export::{Export, File, OnDevice};
+pub use field::{Field, Look};
+pub use process::{Process, Progress, Step};
 pub use subject::{AskedField, Subject};
 pub use view::{CellUse, Open, PreparedView, Random, Setting, Settings, View, ViewPlan};
 
 /// Every technique. Adding one is one line.
 pub const ALL: &[Technique] = &[
     emission_absorption::TECHNIQUE,
+    histogram::TECHNIQUE,
     isosurface::TECHNIQUE,
     photon_transport::TECHNIQUE,
     projection::TECHNIQUE,
@@ -77,7 +83,7 @@ pub struct Technique {
     pub kind: Kind,
 }
 
-/// The two kinds of technique.
+/// The three kinds of technique.
 #[derive(Clone, Copy)]
 pub enum Kind {
     /// Turns a camera into an image.
@@ -96,6 +102,11 @@ pub enum Kind {
         /// How much of it there may be.
         work: Work,
     },
+    /// Turns a subject into a file.
+    Export {
+        /// Makes the export; its parameters may name what is stored.
+        parse: fn(&Value, &str, &Assets) -> Result<Arc<dyn Export>>,
+    },
 }
 
 /// The parameter of a field that says how much it works.
@@ -112,11 +123,12 @@ pub struct Work {
 }
 
 impl Technique {
-    /// `view` or `field`.
+    /// `view`, `field` or `export`.
     pub fn kind_name(&self) -> &'static str {
         match self.kind {
             Kind::View { .. } => "view",
             Kind::Field { .. } => "field",
+            Kind::Export { .. } => "export",
         }
     }
 
@@ -124,7 +136,7 @@ impl Technique {
     pub fn complete(&self) -> &'static str {
         match self.kind {
             Kind::View { complete, .. } => complete,
-            Kind::Field { .. } => self.name,
+            Kind::Field { .. } | Kind::Export { .. } => self.name,
         }
     }
 }
@@ -142,6 +154,11 @@ pub fn find(name: &str) -> Option<&'static Technique> {
 /// The views, in the list's order.
 pub fn views() -> impl Iterator<Item = &'static Technique> {
     ALL.iter().filter(|t| matches!(t.kind, Kind::View { .. }))
+}
+
+/// The exports, in the list's order.
+pub fn exports() -> impl Iterator<Item = &'static Technique> {
+    ALL.iter().filter(|t| matches!(t.kind, Kind::Export { .. }))
 }
 
 /// The fields, in the list's order.

@@ -56,7 +56,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DMat3, DVec3};
 use serde_json::{Value, json};
 
-use super::{Field, Kind, Process, Technique, Work};
+use super::{Field, Kind, Look, Process, Technique, Work};
 use crate::asset::Assets;
 use crate::device::enums::{DeviceEnum, PhaseKind};
 use crate::device::program::{Source, Variant};
@@ -224,7 +224,7 @@ impl Field for Arc<Simulation> {
         Arc::new(Arc::new(other))
     }
 
-    fn begin(&self, device: &mut Device) -> Result<Box<dyn Process>> {
+    fn begin(&self, device: &mut Device) -> Result<Box<dyn Process<Look = Look>>> {
         Ok(Box::new(Run::new(device, self.clone())?))
     }
 }

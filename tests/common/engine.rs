@@ -10,7 +10,7 @@ use cloudchamber::device::{DeviceConfig, DeviceInfo};
 use cloudchamber::error::Error;
 use cloudchamber::film::{ErrorEstimate, Film};
 use cloudchamber::job::Job;
-use cloudchamber::render::Scene;
+use cloudchamber::render::{ExportTask, Scene};
 use cloudchamber::service::Service;
 use cloudchamber::study::bench::Bench;
 use serde_json::{Value, json};
@@ -39,7 +39,7 @@ pub struct House {
 impl House {
     /// A house on a device.
     pub fn on(config: DeviceConfig) -> Self {
-        super::keep_kernels();
+        let _opening = super::opening();
         let data = tempfile::tempdir().unwrap();
         let limits = Flags::parse_from(["test", "--keep-film-bytes", "1000000000"]).limits;
         let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().unwrap();
@@ -86,6 +86,18 @@ impl House {
     /// Runs a request to its end.
     pub fn finish(&self, request: &Value) -> Arc<Job> {
         let done = self.runtime.block_on(self.service.submit_and_wait(request.clone()));
+        done.unwrap_or_else(|e| panic!("{request}: {e}"))
+    }
+
+    /// The valid request of an export.
+    pub fn export_task(&self, request: &Value) -> ExportTask {
+        ExportTask::from_json(request, self.assets(), self.service.limits())
+            .unwrap_or_else(|e| panic!("{request}: {e}"))
+    }
+
+    /// Runs an export to its end.
+    pub fn export(&self, request: &Value) -> Arc<Job> {
+        let done = self.runtime.block_on(self.service.export_and_wait(request.clone()));
         done.unwrap_or_else(|e| panic!("{request}: {e}"))
     }
 

@@ -13,6 +13,7 @@ pub mod writers;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// An object with more fields, or others in their place.
@@ -35,10 +36,17 @@ pub fn kernel_cache() -> PathBuf {
         .map_or_else(|| PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("kernels"), PathBuf::from)
 }
 
-/// Has PoCL in this process keep what it compiles there. Once, since it changes the environment.
-pub fn keep_kernels() {
-    static ONCE: std::sync::Once = std::sync::Once::new();
-    ONCE.call_once(|| cloudchamber::device::keep_compiled_kernels_in(&kernel_cache()).unwrap());
+/// Held while a device of this process is opened: OpenCL's loader and PoCL begin their work then, which they do for one thread at a time.
+/// The first has PoCL keep what it compiles in the tests' cache; it changes the environment for that.
+pub fn opening() -> MutexGuard<'static, ()> {
+    static KEPT: Mutex<bool> = Mutex::new(false);
+    static OPENING: Mutex<()> = Mutex::new(());
+    let held = OPENING.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+    if !std::mem::replace(&mut *kept, true) {
+        cloudchamber::device::keep_compiled_kernels_in(&kernel_cache()).unwrap();
+    }
+    held
 }
 
 /// Says what a test that passes did not do: the macros that print would be silenced.

@@ -5,21 +5,21 @@
 
 use std::path::Path;
 
+use cloudchamber::technique;
 use cloudchamber::volume::RawQuery;
 use serde_json::{Value, json};
 
 use super::engine::House;
 
-/// The files whose requests all end in a picture.
-const PICTURES: [&str; 8] =
-    ["emission_absorption", "isosurface", "projection", "slice", "scattering", "photon_transport", "scene", "warnings"];
+/// The files whose requests do not all end in a picture.
+const NO_PICTURES: [&str; 4] = ["calls", "errors", "exports", "plans"];
 /// What an entry says of itself beside its request.
-const ABOUT: [&str; 4] = ["name", "reference", "compare", "changed"];
+const ABOUT: [&str; 5] = ["name", "reference", "compare", "changed", "few_steps"];
 
 /// One of the list.
 pub struct Asked {
     pub name: String,
-    /// `reference`, `compare` and `changed`, where it has them.
+    /// `reference`, `compare`, `changed` and `few_steps`, where it has them.
     pub about: Value,
     pub request: Value,
 }
@@ -36,8 +36,8 @@ impl Asked {
 
     /// The technique that it is there for: the one of its field, where it has one.
     pub fn technique(&self) -> &str {
-        let is_field = self.request["volume"].get("photon_transport").is_some();
-        if is_field { "photon_transport" } else { self.request["technique"].as_str().unwrap() }
+        let field = technique::fields().find(|t| self.request["volume"].get(t.name).is_some());
+        field.map_or_else(|| self.request["technique"].as_str().unwrap(), |t| t.name)
     }
 
     /// Tells if it needs a volume that only a [`House`] has.
@@ -76,7 +76,8 @@ fn folder() -> &'static Path {
 
 /// All requests that end in a picture.
 pub fn list() -> Vec<Asked> {
-    PICTURES.iter().flat_map(|name| entries(&folder().join(name).with_extension("json"))).collect()
+    let of_pictures = |file: &String| !NO_PICTURES.contains(&file.as_str());
+    everything().into_iter().filter(|(file, _)| of_pictures(file)).map(|(_, asked)| asked).collect()
 }
 
 /// Every entry of every file, with the name of its file.

@@ -15,7 +15,7 @@ use std::path::Path;
 use cloudchamber::device::{Device, DeviceConfig};
 
 fn open(lanes: Option<u32>, kernels: Option<&Path>) -> Device {
-    crate::common::keep_kernels();
+    let _opening = crate::common::opening();
     Device::open(&DeviceConfig { lanes, kernels: kernels.map(Path::to_owned), strict: true, ..DeviceConfig::pocl() })
         .unwrap()
 }

@@ -9,6 +9,7 @@ mod common;
 
 mod device;
 mod emission_absorption;
+mod histogram;
 mod isosurface;
 mod levels;
 mod photon_transport;

@@ -12,7 +12,7 @@ use crate::common::picture::{Picture, check_comparison};
 use crate::common::pictures::{self, Asked};
 use cloudchamber::device::DeviceConfig;
 use cloudchamber::render;
-use cloudchamber::technique;
+use cloudchamber::technique::{self, Technique};
 use serde_json::{Value, json};
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/pictures");
@@ -20,6 +20,11 @@ const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/pictures");
 const SIZE: [usize; 2] = [16, 12];
 /// They take at most so many bytes.
 const ROOM: u64 = 300_000;
+
+/// The techniques that a picture is of.
+fn of_pictures() -> impl Iterator<Item = &'static Technique> {
+    technique::views().chain(technique::fields())
+}
 
 /// The requests whose films are committed, each with a small picture.
 fn references() -> Vec<Asked> {
@@ -57,30 +62,17 @@ fn committed(name: &str) -> Result<Picture, String> {
 #[test]
 fn launches_of_a_few_steps_make_the_same_pictures() {
     let cut = House::on(DeviceConfig { first_steps: 64, ..DeviceConfig::pocl() });
-    let names = [
-        "composite_u8",
-        "composite_back_to_front",
-        "surface_u8",
-        "surfaces_f32",
-        "maximum_f32_b_spline",
-        "single_f32_all_lights",
-        "path_u16_weighted_colours",
-        "photons_chamber",
-        "photons_labels_by_collisions",
-        "photons_gamma",
-    ];
-    let list = pictures::list();
-    for name in names {
-        let asked = list.iter().find(|a| a.name == name).unwrap_or_else(|| panic!("{name} is not in the list"));
-        let mut request = asked.request.clone();
-        if request["technique"] == "projection" {
-            // It looks at 512 steps at a time.
-            request["projection"]["step_voxels"] = json!(0.05);
-        }
-        let film = |house: &House| house.film(&pictures::with_volumes(&request, house)).0;
+    let list: Vec<Asked> = pictures::list().into_iter().filter(|asked| asked.about["few_steps"] == true).collect();
+    let techniques: BTreeSet<&str> = list.iter().map(Asked::technique).collect();
+    for asked in &list {
+        let (name, request) = (&asked.name, &asked.request);
+        let film = |house: &House| house.film(&pictures::with_volumes(request, house)).0;
         let (whole, cut) = (film(House::shared()), film(&cut));
         assert!(whole.main.mean == cut.main.mean && whole.main.m2 == cut.main.m2, "{name}: another picture");
     }
+    // Every technique whose kernel leaves something to the next launch.
+    let resumes = |t: &&Technique| ((t.source)().words)().contains("_STATE_WORDS");
+    assert_eq!(techniques, of_pictures().filter(resumes).map(|t| t.name).collect());
 }
 
 #[test]
@@ -103,7 +95,7 @@ fn the_films_are_those_of_a_tenth_of_the_list_and_small() {
     let list = references();
     assert!(10 * list.len() >= pictures::everything().len(), "only {} are of a tenth", list.len());
     let techniques: BTreeSet<&str> = list.iter().map(Asked::technique).collect();
-    assert_eq!(techniques, technique::ALL.iter().map(|t| t.name).collect());
+    assert_eq!(techniques, of_pictures().map(|t| t.name).collect());
     let wanted: BTreeSet<PathBuf> = list.iter().flat_map(|asked| files(&asked.name)).collect();
     let kept: BTreeSet<PathBuf> = std::fs::read_dir(FOLDER).unwrap().map(|entry| entry.unwrap().path()).collect();
     let others: Vec<_> = kept.symmetric_difference(&wanted).collect();
@@ -126,7 +118,7 @@ fn all_techniques_voxel_types_and_features_are_in_the_list() {
     let names: BTreeSet<&String> = everything.iter().map(|(_, asked)| &asked.name).collect();
     assert!(everything.len() >= 200 && names.len() == everything.len(), "names are their own");
     let techniques: BTreeSet<&str> = list.iter().map(Asked::technique).collect();
-    assert_eq!(techniques, technique::ALL.iter().map(|t| t.name).collect());
+    assert_eq!(techniques, of_pictures().map(|t| t.name).collect());
     let mut met = BTreeSet::new();
     for asked in &list {
         let request = pictures::with_volumes(&asked.request, house);
@@ -135,7 +127,7 @@ fn all_techniques_voxel_types_and_features_are_in_the_list() {
         met.extend(variant.voxel.map(|v| (variant.kernel, "voxel", format!("{v:?}"))));
         met.extend(variant.features.iter().map(|(name, value)| (variant.kernel, *name, value.to_string())));
     }
-    for technique in technique::ALL {
+    for technique in of_pictures() {
         for variant in ((technique.source)().variants)() {
             let voxel = variant.voxel.map(|v| (variant.kernel, "voxel", format!("{v:?}")));
             let features = variant.features.iter().map(|(name, value)| (variant.kernel, *name, value.to_string()));

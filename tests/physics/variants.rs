@@ -68,6 +68,16 @@ fn reach(house: &House, techniques: &[&Technique]) {
     for technique in techniques {
         for (at, case) in (technique.cases)().all.into_iter().enumerate() {
             let (name, own) = (technique.name, &case.own);
+            if let Kind::Export { .. } = technique.kind {
+                for id in &varied {
+                    let request = json!({"technique": name, name: own, "volume": {"id": id}});
+                    let task = house.export_task(&request);
+                    reached
+                        .extend(task.export().kernels(task.subject()).unwrap().iter().map(|variant| variant.label()));
+                    assert!(!house.export(&request).file().unwrap().bytes.is_empty(), "{request}: nothing is there");
+                }
+                continue;
+            }
             if let Kind::Field { .. } = technique.kind {
                 let field = with_volumes(&json!({name: own}), house);
                 let request = request("projection", &json!({"mode": "maximum"}), &field);

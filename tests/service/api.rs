@@ -3,6 +3,7 @@
 mod budgets;
 mod cameras;
 mod commands;
+mod exports;
 mod info;
 mod openapi;
 mod plans;

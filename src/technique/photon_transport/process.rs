@@ -157,6 +157,8 @@ impl Run {
 }
 
 impl Process for Run {
+    type Look = Look;
+
     fn step(&mut self, device: &mut Device, slice: Duration) -> Result<Step> {
         let end = self.batch_end(self.ledgers.len());
         let before = self.device_time;

@@ -13,7 +13,9 @@ fn oclgrind(scene: &Value, lanes: &str, kernels: Option<&Path>) -> String {
     let (file, log) = (folder.path().join("scene.json"), folder.path().join("log"));
     std::fs::write(&file, scene.to_string()).unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_cloudchamber"));
-    command.arg("render").arg(&file).args(["--device", "oclgrind", "--lanes", lanes, "--data-dir"]).arg(folder.path());
+    let technique = technique::find(scene["technique"].as_str().unwrap()).unwrap();
+    let what = if technique.kind_name() == "export" { "export" } else { "render" };
+    command.arg(what).arg(&file).args(["--device", "oclgrind", "--lanes", lanes, "--data-dir"]).arg(folder.path());
     command.arg("-o").arg(folder.path().join("out.png"));
     if let Some(kernels) = kernels {
         command.arg("--kernels").arg(kernels);

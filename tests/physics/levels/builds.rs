@@ -11,12 +11,12 @@ use cloudchamber::volume::VoxelType;
 use rayon::prelude::*;
 
 use super::compiler::{Compiler, LEVELS, Level};
-use crate::common::{keep_kernels, kernels, say};
+use crate::common::{kernels, opening, say};
 
 fn compiler() -> &'static Compiler {
     static COMPILER: OnceLock<Compiler> = OnceLock::new();
     COMPILER.get_or_init(|| {
-        keep_kernels();
+        let _opening = opening();
         Compiler::of(&device::select("pocl", None).unwrap().1.platform_version)
     })
 }

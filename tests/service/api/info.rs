@@ -6,7 +6,7 @@ use crate::common::Server;
 use crate::support::*;
 
 #[tokio::test]
-async fn every_technique_has_an_example_that_renders_a_picture() {
+async fn every_technique_has_an_example_that_works() {
     let server = shared();
     let api = Api::new(&server);
     let techniques = api.get_json("/v1/techniques").await;
@@ -14,6 +14,13 @@ async fn every_technique_has_an_example_that_renders_a_picture() {
     let named: Vec<_> = techniques.iter().map(|t| t["name"].as_str().unwrap()).collect();
     assert!(named.contains(&"emission_absorption") && named.contains(&"photon_transport"), "{named:?}");
     for technique in techniques {
+        if technique["kind"] == "export" {
+            let response = api.post_to("/v1/exports", &technique["example"]).await;
+            assert_eq!(response.status(), 202, "{technique}");
+            let file = format!("{}/file?wait=final", response.headers()["location"].to_str().unwrap());
+            assert!(api.get(&file).await.bytes().await.unwrap().len() > 20, "{technique}");
+            continue;
+        }
         let png = api.png(&technique["example"]).await;
         assert!(colours(&png) > 20, "{} has {} colours", technique["name"], colours(&png));
     }
@@ -24,18 +31,21 @@ async fn every_technique_is_described_by_a_closed_schema() {
     let server = shared();
     let api = Api::new(&server);
     let document = api.get_json("/openapi.json").await;
-    let request = &document["components"]["schemas"]["RenderRequest"];
-    let requests = jsonschema::validator_for(request).unwrap();
+    let [request, export] = ["RenderRequest", "ExportRequest"].map(|name| &document["components"]["schemas"][name]);
     for technique in api.get_json("/v1/techniques").await["techniques"].as_array().unwrap() {
         let name = technique["name"].as_str().unwrap();
         let parent = if technique["kind"] == "view" {
             let names = request["properties"]["technique"]["enum"].as_array().unwrap();
             assert!(names.contains(&technique["name"]), "{name} is not in {names:?}");
             request
+        } else if technique["kind"] == "export" {
+            export
         } else {
             assert_eq!(technique["kind"], "field");
             &request["properties"]["volume"]
         };
+        let whole = if technique["kind"] == "export" { export } else { request };
+        let requests = jsonschema::validator_for(whole).unwrap();
         let schema = &technique["schema"];
         let keys = |s: &Value| s["properties"].as_object().unwrap().keys().cloned().collect::<Vec<_>>();
         assert_eq!(keys(&parent["properties"][name]), keys(schema), "{name}");

@@ -1,0 +1,96 @@
+//! `export`: a volume or a field to a file, here or by a server.
+
+use std::path::PathBuf;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::{Value, json};
+
+use super::client::Client;
+use super::{insert, read_json};
+use crate::config::{DeviceArgs, Limits};
+use crate::error::{Error, Result};
+use crate::job::State;
+use crate::service::Service;
+
+/// What `export` is told.
+#[derive(clap::Args)]
+pub(super) struct Arguments {
+    /// The request (the JSON of POST /v1/exports), or - for standard input
+    request: PathBuf,
+    /// Where the file goes
+    #[arg(short, long, default_value = "out.csv")]
+    output: PathBuf,
+    /// Volume file to export, in place of the request's volume
+    #[arg(long)]
+    volume: Option<PathBuf>,
+    /// Let the server at this URL do it
+    #[arg(long, env = "CLOUDCHAMBER_SERVER")]
+    server: Option<String>,
+    /// Bearer token for that server
+    #[arg(long, env = "CLOUDCHAMBER_TOKEN", hide_env_values = true)]
+    token: Option<String>,
+    #[command(flatten)]
+    pub device: DeviceArgs,
+    #[command(flatten)]
+    limits: Limits,
+}
+
+/// Makes a file and writes it.
+///
+/// # Errors
+/// Those of the request, of its file, and of the server where one is named.
+pub(super) async fn export(args: &Arguments) -> Result<()> {
+    let request = read_json(&args.request)?;
+    let style = ProgressStyle::with_template("{bar:30} {percent}%  {msg}  {elapsed}");
+    let bar = ProgressBar::new(0).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let (bytes, resource) = match &args.server {
+        Some(server) => export_there(args, server, request, &bar).await?,
+        None => export_here(args, request, &bar).await?,
+    };
+    bar.finish();
+    std::fs::write(&args.output, &bytes).map_err(|e| Error::internal(format!("{}: {e}", args.output.display())))?;
+    let ms = resource["timings"]["elapsed_ms"].as_f64().unwrap_or(0.0);
+    println!("{}: {} bytes, {ms:.0} ms, {}", args.output.display(), bytes.len(), resource["result"]);
+    Ok(())
+}
+
+fn show(bar: &ProgressBar, progress: &Value) {
+    bar.set_length(progress["total"].as_u64().unwrap_or(0));
+    bar.set_position(progress["done"].as_u64().unwrap_or(0));
+    bar.set_message(progress["of"].as_str().unwrap_or_default().to_owned());
+}
+
+async fn export_there(
+    args: &Arguments,
+    server: &str,
+    mut request: Value,
+    bar: &ProgressBar,
+) -> Result<(Vec<u8>, Value)> {
+    let client = Client::new(server, args.token.clone())?;
+    if let Some(path) = &args.volume {
+        request["volume"] = json!({"id": client.upload(path).await?});
+    }
+    client.run("/v1/exports", &request, "file", |event| show(bar, &event["progress"])).await
+}
+
+/// The same code as the server's, without the server.
+async fn export_here(args: &Arguments, mut request: Value, bar: &ProgressBar) -> Result<(Vec<u8>, Value)> {
+    let service = Service::start(args.device.device_config(), &args.device.data_dir(), args.limits.clone())?;
+    if let Some(path) = &args.volume {
+        request["volume"] = insert(&service, path)?;
+    }
+    service.engine().ready().await?;
+    let job = service.queue(service.prepare_export(request).await?);
+    let mut updates = job.watch();
+    loop {
+        let state = updates.borrow_and_update().state;
+        show(bar, &job.resource()["progress"]);
+        match (state, job.file()) {
+            (State::Done, Some(file)) => return Ok((file.bytes.to_vec(), job.resource())),
+            (State::Failed | State::Cancelled, _) => {
+                return Err(job.failure().unwrap_or_else(|| Error::internal("the export was cancelled")));
+            }
+            _ => updates.changed().await.map_err(Error::internal)?,
+        }
+    }
+}

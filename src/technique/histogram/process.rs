@@ -1,0 +1,111 @@
+//! The histogram on the device: some voxels a slice, counted in whole numbers, so that the table is the same for any number of threads.
+
+use std::fmt::Write;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::Duration;
+
+use serde_json::{Value, json};
+
+use super::{HistogramPass, variant};
+use crate::device::{Buffer, Device, SliceLength};
+use crate::error::Result;
+use crate::technique::{File, Process, Progress, Step};
+use crate::volume::Volume;
+
+/// Voxels of a work-item.
+const PER_ITEM: u32 = 4096;
+/// Counts behind those of the bins: below the range, above it, no number.
+const OTHERS: usize = 3;
+
+/// A histogram at work.
+pub(super) struct Run {
+    volume: Arc<Volume>,
+    voxels: Rc<Buffer>,
+    bins: usize,
+    range: [f64; 2],
+    pass: HistogramPass,
+    pass_buffer: Buffer,
+    counts: Buffer,
+    slice_length: SliceLength,
+}
+
+impl Run {
+    /// Room for the counts.
+    pub fn new(device: &Device, volume: Arc<Volume>, voxels: Rc<Buffer>, bins: u32, range: [f64; 2]) -> Result<Self> {
+        let raw = range.map(|value| (value - volume.inter()) / volume.slope());
+        let pass = HistogramPass {
+            first: 0,
+            end: volume.voxels().len() as u32,
+            per_item: PER_ITEM,
+            bins: bins as i32,
+            low: raw[0] as f32,
+            per_raw: (f64::from(bins) / (raw[1] - raw[0])) as f32,
+        };
+        let bins = bins as usize;
+        Ok(Self {
+            pass_buffer: device.allocate(size_of::<HistogramPass>())?,
+            counts: device.upload(&vec![0; 4 * (bins + OTHERS)], 0)?,
+            slice_length: SliceLength::new(device.info(), 1.0, None),
+            volume,
+            voxels,
+            bins,
+            range,
+            pass,
+        })
+    }
+
+    /// The table as CSV.
+    fn table(&self, counts: &[u32]) -> String {
+        let [low, high] = self.range;
+        let edge = |bin: usize| low + (high - low) * bin as f64 / self.bins as f64;
+        let (of_bins, others) = counts.split_at(self.bins);
+        let finite = of_bins.iter().chain(&others[..2]).map(|n| u64::from(*n)).sum::<u64>().max(1) as f64;
+        let mut at_least: u64 = of_bins.iter().map(|n| u64::from(*n)).sum::<u64>() + u64::from(others[1]);
+        let mut text = String::from("from,to,voxels,part_at_least\n");
+        for (bin, count) in of_bins.iter().enumerate() {
+            // Writing to a string cannot fail.
+            let _ = writeln!(text, "{},{},{count},{}", edge(bin), edge(bin + 1), at_least as f64 / finite);
+            at_least -= u64::from(*count);
+        }
+        text
+    }
+
+    fn result(&self, counts: &[u32]) -> Value {
+        let [below, above, no_number] = [0, 1, 2].map(|i| counts[self.bins + i]);
+        json!({"bins": self.bins, "range": self.range, "voxels": self.pass.end, "below": below, "above": above,
+            "not_a_number": no_number, "unit": self.volume.unit()})
+    }
+}
+
+impl Process for Run {
+    type Look = File;
+
+    fn step(&mut self, device: &mut Device, slice: Duration) -> Result<Step> {
+        let left = self.pass.end - self.pass.first;
+        let items = self.slice_length.items(device.info(), slice, PER_ITEM as usize);
+        let items = items.min(left.div_ceil(PER_ITEM) as usize);
+        device.write(&mut self.pass_buffer, 0, bytemuck::bytes_of(&self.pass))?;
+        let arguments = [("pass", &self.pass_buffer), ("voxels", &*self.voxels), ("counts", &self.counts)];
+        let took = device.run(&variant(self.volume.voxel_type()), &arguments, items)?;
+        self.slice_length.learn(items, PER_ITEM as usize, took);
+        self.pass.first += left.min((items as u32).saturating_mul(PER_ITEM));
+        Ok(Step {
+            progress: Progress { of: "voxels", done: self.pass.first.into(), total: self.pass.end.into() },
+            device_time: took,
+            is_whole: true,
+            is_look_due: false,
+        })
+    }
+
+    fn stop(&mut self, _: &mut Device) -> Result<()> {
+        Ok(())
+    }
+
+    fn look(&mut self, device: &mut Device) -> Result<File> {
+        let mut counts = vec![0u32; self.bins + OTHERS];
+        device.read(&self.counts, 0, &mut counts)?;
+        let result = self.result(&counts);
+        Ok(File { bytes: self.table(&counts).into(), media_type: "text/csv", extension: "csv", result })
+    }
+}
