@@ -1,10 +1,10 @@
-// The march all views share. A work-item renders a beam: BEAM_W x BEAM_H packets of TILE_W x TILE_H pixels, so that neighbours
-// find each other's voxels in the nearest cache. All rays take their samples on one grid of steps: sample k stands for
+// The march all views share. A work-item renders a beam. All rays take their samples on one grid of steps: sample k stands for
 // k h <= t <= (k + 1) h and lies at (k + jitter) h, each pixel with a jitter of its own. So what is empty is skipped for a
 // whole beam by one scalar walk along its middle, and the picture is the one without skipping.
 #ifndef SHARED_PACKET_H
 #define SHARED_PACKET_H
 
+#include "shared/beam.h"
 #include "shared/block.h"
 #include "shared/camera.h"
 #include "shared/inner.h"
@@ -13,14 +13,6 @@
 #include "shared/shade.h"
 #include "shared/volume.h"
 
-#if LANES == 1
-#define BEAM_W 1
-#define BEAM_H 1
-#else
-#define BEAM_W 2
-#define BEAM_H 2
-#endif
-#define PACKETS (BEAM_W * BEAM_H)
 // Samples between two checks of the cells and of the packets that go on.
 #define STRIDE 8
 
@@ -48,12 +40,6 @@ typedef struct {
     int begin, end;                // steps in which any lane has a sample
 } Beam;
 
-// The number of beams of the pass.
-static inline int beams(constant const View *view) {
-    int w = TILE_W * BEAM_W, h = TILE_H * BEAM_H;
-    return ((view->width + w - 1) / w) * ((view->height + h - 1) / h);
-}
-
 #ifdef NARROW
 // The least of linear functions lies above its chord, the greatest below.
 static inline void narrow_range(constant const View *view, Packet *p) {
@@ -79,10 +65,10 @@ static inline void narrow_range(constant const View *view, Packet *p) {
 }
 #endif
 
-static inline Packet packet_at(constant const View *view, int left, int top, float margin) {
+static inline Packet packet_at(constant const View *view, int2 corner, float margin) {
     Packet p;
-    p.column = left + LANE_IDS % TILE_W;
-    p.row = top + LANE_IDS / TILE_W;
+    p.column = corner.x + LANE_IDS % TILE_W;
+    p.row = corner.y + LANE_IDS / TILE_W;
     p.inside = MASK(p.column < view->width) & MASK(p.row < view->height);
     Int column = p.column * view->stride, row = p.row * view->stride;
     UInt4Lanes ctr = {as_UInt(row * view->full_width + column), (UInt)(view->sample), (UInt)(0u), (UInt)(view->stream)};
@@ -104,11 +90,9 @@ static inline Packet packet_at(constant const View *view, int left, int top, flo
 }
 
 static inline Beam beam_at(constant const View *view, int number, float margin, Packet *packets) {
-    int beams_wide = (view->width + TILE_W * BEAM_W - 1) / (TILE_W * BEAM_W);
-    int left = (number % beams_wide) * TILE_W * BEAM_W, top = (number / beams_wide) * TILE_H * BEAM_H;
     Real first = (Real)(1e30f), last = (Real)(-1e30f);
     for (int i = 0; i < PACKETS; i++) {
-        packets[i] = packet_at(view, left + (i % BEAM_W) * TILE_W, top + (i / BEAM_W) * TILE_H, margin);
+        packets[i] = packet_at(view, packet_corner(view, number, i), margin);
         Mask hit = MASK(packets[i].ray.t_far > packets[i].ray.t_near);
         first = fmin(first, select((Real)(1e30f), packets[i].ray.t_near, hit));
         last = fmax(last, select((Real)(-1e30f), packets[i].ray.t_far, hit));

@@ -3,6 +3,7 @@
 #ifndef SHARED_VOLUME_H
 #define SHARED_VOLUME_H
 
+#include "shared/image.h"
 #include "shared/lanes.h"
 #include "shared/voxel.h"
 
@@ -11,17 +12,7 @@
 #error "a kernel that reads volumes is built with an INTERPOLATION"
 #endif
 
-// A volume is a buffer; on a GPU it is a 3D image, whose sampler interpolates in hardware (its weights have 8 fractional bits).
-// The functions that read it have a body for each.
-#if VOLUMES_ARE_IMAGES
-#define VOLUME read_only image3d_t
-constant const sampler_t linear_sampler = CLK_NORMALIZED_COORDS_FALSE | CLK_ADDRESS_CLAMP_TO_EDGE | CLK_FILTER_LINEAR;
-constant const sampler_t point_sampler = CLK_NORMALIZED_COORDS_FALSE | CLK_ADDRESS_CLAMP_TO_EDGE | CLK_FILTER_NEAREST;
-// Samplers filter whole numbers as parts of the largest.
-#define CHANNEL_SCALE (VOXEL == VOXEL_U8 ? 255.0f : VOXEL == VOXEL_I16 ? 32767.0f : VOXEL == VOXEL_U16 ? 65535.0f : 1.0f)
-#else
-#define VOLUME global const uchar *
-#endif
+// A volume is a buffer or a 3D image. The functions that read it have a body for each.
 
 // The voxel at the start of a word.
 static inline Real first_voxel(Int word) {

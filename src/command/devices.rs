@@ -37,7 +37,7 @@ pub(super) fn show_devices(args: &DeviceArgs) -> Result<()> {
 pub(super) fn show_variants(args: &DeviceArgs) -> Result<()> {
     let (_, used) = device::select(&args.device, args.lanes)?;
     let mut variants = Vec::new();
-    for technique in technique::ALL {
+    for technique in technique::all() {
         let source = (technique.source)();
         for (i, variant) in (source.variants)().iter().enumerate() {
             let features: serde_json::Map<String, Value> =

@@ -10,6 +10,7 @@ mod include;
 mod launch;
 mod level;
 pub mod program;
+pub mod reduce;
 mod resume;
 mod select;
 mod signature;

@@ -30,7 +30,7 @@ pub(super) fn recorder() -> Result<PrometheusHandle> {
 /// `GET /v1/techniques`.
 pub(super) async fn techniques(State(app): State<App>) -> Json<Value> {
     let one = |t: &technique::Technique| json!({"name": t.name, "kind": t.kind_name(), "summary": t.summary, "schema": render::parameters_schema(t, app.service.limits()), "example": (t.example)()});
-    Json(json!({"techniques": technique::ALL.iter().map(one).collect::<Vec<_>>()}))
+    Json(json!({"techniques": technique::all().map(one).collect::<Vec<_>>()}))
 }
 
 /// `GET /v1/device`.

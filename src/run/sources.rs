@@ -1,14 +1,14 @@
 //! Every kernel of this program, and those that are compiled before somebody asks for them.
 
 use crate::device::program::{Source, Variant};
-use crate::device::{cells, encode};
+use crate::device::{cells, encode, reduce};
 use crate::error::{Error, Result};
 use crate::technique;
 use crate::volume::VoxelType;
 
 /// Every kernel that there is.
 pub fn sources() -> impl Iterator<Item = Source> {
-    technique::ALL.iter().map(|t| (t.source)()).chain(cells::sources()).chain([encode::source()])
+    technique::all().map(|t| (t.source)()).chain(cells::sources()).chain([encode::source(), reduce::source()])
 }
 
 /// The source of a variant.

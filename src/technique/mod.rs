@@ -21,7 +21,7 @@ mod subject;
 mod view;
 pub mod volume_path;
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use serde_json::Value;
 
@@ -29,7 +29,7 @@ use crate::asset::Assets;
 use crate::config::Limits;
 use crate::device::enums::{Count, DeviceEnum};
 use crate::device::program::Source;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::scene::interpolation::Interpolation;
 pub use case::{Case, Cases};
 pub use export::{Export, File, OnDevice};
@@ -59,7 +59,7 @@ impl DeviceEnum for Interpolation {
 }
 
 /// The names that all views' kernels share: of interpolations and counts.
-pub(crate) fn view_words() -> String {
+pub fn view_words() -> String {
     Interpolation::opencl_text() + &Count::opencl_text()
 }
 
@@ -146,22 +146,41 @@ pub(crate) fn smoke() -> Value {
     serde_json::json!({"volume": {"builtin": "smoke", "resolution": 64}})
 }
 
+static ADDED: OnceLock<&'static [Technique]> = OnceLock::new();
+
+/// Adds techniques of the program that this library is part of to the list, once, before a service is started. Their kernel files are read
+/// from the folder of [`crate::device::DeviceConfig::kernels`].
+///
+/// # Errors
+/// [`Error::Conflict`] where that was done already, or a name is taken.
+pub fn add(techniques: &'static [Technique]) -> Result<()> {
+    if let Some(taken) = techniques.iter().find(|t| ALL.iter().any(|known| known.name == t.name)) {
+        return Err(Error::Conflict(format!("there is a technique {} already", taken.name)));
+    }
+    ADDED.set(techniques).map_err(|_| Error::Conflict("techniques were added already".into()))
+}
+
+/// Every technique that is served: [`ALL`], and those that were added.
+pub fn all() -> impl Iterator<Item = &'static Technique> {
+    ALL.iter().chain(ADDED.get().copied().unwrap_or_default())
+}
+
 /// The technique of a name.
 pub fn find(name: &str) -> Option<&'static Technique> {
-    ALL.iter().find(|t| t.name == name)
+    all().find(|t| t.name == name)
 }
 
 /// The views, in the list's order.
 pub fn views() -> impl Iterator<Item = &'static Technique> {
-    ALL.iter().filter(|t| matches!(t.kind, Kind::View { .. }))
+    all().filter(|t| matches!(t.kind, Kind::View { .. }))
 }
 
 /// The exports, in the list's order.
 pub fn exports() -> impl Iterator<Item = &'static Technique> {
-    ALL.iter().filter(|t| matches!(t.kind, Kind::Export { .. }))
+    all().filter(|t| matches!(t.kind, Kind::Export { .. }))
 }
 
 /// The fields, in the list's order.
 pub fn fields() -> impl Iterator<Item = &'static Technique> {
-    ALL.iter().filter(|t| matches!(t.kind, Kind::Field { .. }))
+    all().filter(|t| matches!(t.kind, Kind::Field { .. }))
 }

@@ -43,7 +43,7 @@ impl House {
         let data = tempfile::tempdir().unwrap();
         let limits = Flags::parse_from(["test", "--keep-film-bytes", "1000000000"]).limits;
         let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().unwrap();
-        let config = DeviceConfig { kernels: super::kernels(), ..config };
+        let config = DeviceConfig { kernels: config.kernels.clone().or_else(super::kernels), ..config };
         let service = runtime.block_on(async { Service::start(config, data.path(), limits) }).unwrap();
         runtime.block_on(service.engine().ready()).unwrap();
         Self { service, runtime, _data: data }

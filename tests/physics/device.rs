@@ -8,6 +8,7 @@ mod images;
 mod launches;
 mod names;
 mod oclgrind;
+mod reductions;
 mod structs;
 
 use std::path::Path;

@@ -8,6 +8,7 @@ mod support;
 
 mod api;
 mod degrade;
+mod example;
 mod faults;
 mod house;
 mod stream;

@@ -6,6 +6,8 @@ use std::process::Command;
 use cloudchamber::technique;
 use serde_json::Value;
 
+use crate::common::processes::oclgrind_environment;
+
 /// Runs a scene on oclgrind and returns what it logged. It exits 0 with errors in its log, and without the dylib's path the
 /// run would silently happen on PoCL.
 fn oclgrind(scene: &Value, lanes: &str, kernels: Option<&Path>) -> String {
@@ -20,14 +22,7 @@ fn oclgrind(scene: &Value, lanes: &str, kernels: Option<&Path>) -> String {
     if let Some(kernels) = kernels {
         command.arg("--kernels").arg(kernels);
     }
-    let output = command
-        .env("OPENCL_DYLIB_PATH", "/usr/lib/oclgrind/liboclgrind-rt.so")
-        .env("OCLGRIND_LOG", &log)
-        .env("OCLGRIND_DATA_RACES", "1")
-        // Inlining leaves an intrinsic in the code that oclgrind 21.10 does not know.
-        .env("OCLGRIND_BUILD_OPTIONS", "-cl-opt-disable")
-        .output()
-        .unwrap();
+    let output = command.envs(oclgrind_environment(&log)).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     std::fs::read_to_string(log).unwrap_or_default()
 }

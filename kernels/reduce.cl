@@ -1,0 +1,50 @@
+// Sums and extremes of floats. A work-item reduces a block of BLOCK values in their order, and the host adds the blocks up in theirs, so the
+// result is the same for any number of threads and lanes.
+//
+// Sums are compensated (Neumaier, ZAMM 54, 1974): what an addition rounds away is kept apart, and the error of a product is known exactly by
+// fma. Nothing may be contracted, or that would not hold.
+
+#pragma OPENCL FP_CONTRACT OFF
+
+// A sum, and what its additions have rounded away.
+static inline float2 added(float2 sum, float value) {
+    float next = sum.x + value;
+    float lost = fabs(sum.x) >= fabs(value) ? (sum.x - next) + value : (value - next) + sum.x;
+    return (float2)(next, sum.y + lost);
+}
+
+// The values of a work-item's block: none past the end.
+static inline int2 block_of(constant int *count) {
+    int first = (int)get_global_id(0) * BLOCK;
+    return (int2)(first, min(first + BLOCK, *count));
+}
+
+kernel void sum(constant int *count, global const float *a, global float2 *partials) {
+    int2 block = block_of(count);
+    if (block.x >= block.y) return;
+    float2 sum = (float2)(0.0f);
+    for (int i = block.x; i < block.y; i++) sum = added(sum, a[i]);
+    partials[get_global_id(0)] = sum;
+}
+
+kernel void dot_product(constant int *count, global const float *a, global const float *b, global float2 *partials) {
+    int2 block = block_of(count);
+    if (block.x >= block.y) return;
+    float2 sum = (float2)(0.0f);
+    for (int i = block.x; i < block.y; i++) {
+        float product = a[i] * b[i];
+        sum = added(sum, product);
+        sum.y += fma(a[i], b[i], -product);
+    }
+    partials[get_global_id(0)] = sum;
+}
+
+// The least and the greatest value that is a finite number; the first is above the second where there is none.
+kernel void extremes(constant int *count, global const float *a, global float2 *partials) {
+    int2 block = block_of(count);
+    if (block.x >= block.y) return;
+    float2 ends = (float2)(INFINITY, -INFINITY);
+    for (int i = block.x; i < block.y; i++)
+        if (isfinite(a[i])) ends = (float2)(fmin(ends.x, a[i]), fmax(ends.y, a[i]));
+    partials[get_global_id(0)] = ends;
+}
