@@ -71,7 +71,7 @@ fn ripples(x: f64, y: f64, z: f64) -> f64 {
 fn mitsuba(scene: &str, samples: u32) -> Option<Value> {
     let python = concat!(env!("CARGO_MANIFEST_DIR"), "/target/bench-venv/bin/python");
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/mitsuba_cloud.py");
-    // A library that hides the processor's features from PoCL's LLVM (tests/levels) is not for Mitsuba's.
+    // A library that hides the processor's features from PoCL's LLVM (tests/physics/levels) is not for Mitsuba's.
     let command = |python| {
         Command::new(python).env_remove("LD_PRELOAD").args([script, scene, &samples.to_string(), "4"]).output()
     };

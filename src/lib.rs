@@ -7,7 +7,7 @@
 //!
 //! The data goes one way, and modules use each other the other way: `command` → `http` → `study` → `service` → `plan` and `run` → `job` →
 //! `render` → `technique` → `scene` → `request` → `config` → `device` → `film` → `frame` → `asset` → `volume` → `error`, never back and never in a circle
-//! (`tests/house.rs`). `docs/architecture.md` walks one request and one field through the files.
+//! (`tests/service/house.rs`). `docs/architecture.md` walks one request and one field through the files.
 //!
 //! | module | what it is |
 //! |---|---|
@@ -32,8 +32,8 @@
 //! | [`power_law`] | lines on logarithmic axes |
 //! | [`error`] | one error enum; the one place where a status code is chosen |
 //!
-//! Kernels: `kernels/<technique>.cl` and `kernels/shared/`. The viewer: `static/`. Tests: `tests/<technique>.rs` and
-//! `tests/{api,stream,faults,viewer,…}.rs`.
+//! Kernels: `kernels/<technique>.cl` and `kernels/shared/`. The viewer: `static/`. Tests: `tests/physics/<technique>.rs`
+//! in this process, `tests/service/{api,stream,faults,viewer,…}.rs` against the real binary. `docs/add-a-technique.md` says how to add one.
 
 pub mod asset;
 pub mod chart;

@@ -51,7 +51,7 @@ mod report;
 mod source;
 mod tracking;
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::{DAffine3, DMat3, DVec3};
 use serde_json::{Value, json};
@@ -70,6 +70,7 @@ use device::{BoundaryKind, LedgerEntry, Media, MediumNumber, STATE_WORDS, Source
 pub use device::{FieldPass, PhotonTransport};
 use geometry::Geometry;
 use parameters::Parameters;
+use plan::DevicePlan;
 use process::{LOOKS_ON_THE_WAY, Run};
 pub use report::FRACTIONS;
 use tracking::Tracking;
@@ -131,6 +132,8 @@ struct Simulation {
     /// True if deposits are by track length.
     track: bool,
     reasons: Vec<String>,
+    /// The plan, made with the request: of a large grid that takes a while, and the device's thread has other jobs. The first process takes it.
+    plan: Arc<Mutex<Option<DevicePlan>>>,
 }
 
 fn parse(parameters: &Value, at: &str, assets: &Assets) -> Result<Arc<dyn Field>> {
@@ -195,9 +198,10 @@ fn simulation(parameters: &Value, at: &str, assets: &Assets) -> Result<Simulatio
         tracking_reason,
         track,
         reasons,
+        plan: Arc::default(),
     };
-    // Here, not on the device's thread.
-    simulation.clearance();
+    let plan = simulation.device_plan()?;
+    *simulation.plan.lock().unwrap_or_else(PoisonError::into_inner) = Some(plan);
     Ok(simulation)
 }
 
@@ -230,6 +234,12 @@ impl Field for Arc<Simulation> {
 }
 
 impl Simulation {
+    /// The plan that was made with the request, or another.
+    fn take_plan(&self) -> Result<DevicePlan> {
+        let made = self.plan.lock().unwrap_or_else(PoisonError::into_inner).take();
+        made.map_or_else(|| self.device_plan(), Ok)
+    }
+
     /// The grid after so many photons, per photon, from its sums.
     fn grid(&self, sums: &[u64], photons: u64) -> NewVolume {
         let [sx, sy, sz] = self.spacing_mm();

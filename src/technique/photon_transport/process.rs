@@ -65,7 +65,7 @@ struct Launch {
 impl Run {
     /// Room for a simulation whose kernel is built.
     pub fn new(device: &Device, simulation: Arc<Simulation>) -> Result<Self> {
-        let plan = simulation.device_plan()?;
+        let plan = simulation.take_plan()?;
         let grids = own_grids(device.info(), plan.cells);
         Ok(Self {
             table: device.upload(bytemuck::cast_slice(&plan.table), 8)?,
