@@ -5,6 +5,7 @@
 //! enough; where nothing but the step tells the two apart, it gets one for each.
 
 mod launch;
+mod passes;
 
 use std::rc::Rc;
 use std::sync::Arc;
@@ -18,7 +19,6 @@ use super::distances::distances;
 use super::gathered::{Gathered, Pass};
 use super::layer::packets_of_beam;
 use super::motion::{Motion, Moving};
-use super::sample_offsets::sample_offset;
 use super::warnings::warnings;
 use crate::device::structs::View as DeviceView;
 use crate::device::{Buffer, Device, Resume, SliceLength};
@@ -30,8 +30,6 @@ use crate::technique::{PreparedView, Random, ViewPlan};
 
 /// The shortest step that `max_error` leads to, in voxels: the shortest that a request may ask for.
 const LEAST_STEP_VOXELS: f64 = 0.05;
-/// A pass in shorter slices does not tell how fast its kernel is: each waits for its longest rays.
-const TELLING_SLICE: Duration = Duration::from_millis(10);
 /// A picture is not shown before its first pass where that is likely to take less than this.
 const QUICK_MS: f64 = 50.0;
 
@@ -221,77 +219,6 @@ impl ViewRun {
     /// True if a picture is there that was made to be in time.
     pub fn has_hurried(&self) -> bool {
         self.gathered.moving.as_ref().is_some_and(|m| m.layer.samples > 0)
-    }
-
-    /// Works for about `slice` and says which pass it finished, if one.
-    pub fn slice(&mut self, context: &mut DeviceContext, slice: Duration) -> Result<Option<Pass>> {
-        let pass = match self.pass {
-            Some(pass) => pass,
-            None => self.begin(context)?,
-        };
-        let (beams, rays) = self.gathered.layer(pass).items(context.device.info().lanes as usize);
-        let (items, before) = match self.undone.take() {
-            Some(undone) => undone,
-            None => (self.items(&context.device, slice, rays).min(beams - self.cursor), Duration::ZERO),
-        };
-        let took = self.launch(&context.device, pass, items, slice, before > Duration::ZERO)?;
-        self.device_time += took;
-        self.pass_time += took;
-        self.shortest_slice = self.shortest_slice.min(slice);
-        if self.is_bounded(&context.device) && self.resume.has_more() {
-            self.undone = Some((items, before + took));
-            return Ok(None);
-        }
-        self.slice_length.learn(items, rays, before + took);
-        self.cursor += items;
-        if self.cursor < beams {
-            return Ok(None);
-        }
-        if let (Pass::Moving, Some(moving)) = (pass, &self.gathered.moving) {
-            let [width, height] = self.gathered.size;
-            self.ray_ms = Some(moving.ray_ms(self.pass_time.as_secs_f64() * 1e3, width * height));
-        }
-        if pass == Pass::Main {
-            self.ray_ms = None;
-            let [width, height] = self.gathered.size;
-            if self.shortest_slice >= TELLING_SLICE {
-                context.measured(&self.plan.variant, width * height, self.pass_time);
-            }
-        }
-        self.gathered.layer_mut(pass).passed();
-        (self.pass, self.cursor) = (None, 0);
-        // Samples that were put where the error is have no halves.
-        if pass == Pass::Main && !self.random.is_some_and(|r| r.adaptive) {
-            self.gathered.keep_round(context, self.device_time)?;
-        }
-        Ok(Some(pass))
-    }
-
-    /// Chooses the next pass.
-    fn begin(&mut self, context: &DeviceContext) -> Result<Pass> {
-        self.gathered.will_change();
-        let pass = self.gathered.next_pass();
-        let adaptive = pass == Pass::Main && self.random.is_some_and(|r| r.adaptive);
-        self.gathered.layer_mut(pass).choose_tiles(context, adaptive)?;
-        if pass == Pass::Main && self.samples() == 0 {
-            // What is counted is of the picture, not of its preview.
-            context.device.write(&mut self.gathered.counts, 0, &[0; 32])?;
-        }
-        let layer = self.gathered.layer(pass);
-        let view = DeviceView {
-            width: layer.width as i32,
-            height: layer.height as i32,
-            stride: layer.picture_stride as i32,
-            sample: layer.samples as i32,
-            stream: layer.stream,
-            offset: sample_offset(layer.samples).to_array(),
-            step: layer.step,
-            ..self.view
-        };
-        self.pass_view = view;
-        self.pass = Some(pass);
-        (self.pass_time, self.shortest_slice) = (Duration::ZERO, Duration::MAX);
-        Ok(pass)
     }
 }
 
