@@ -25,11 +25,6 @@ pub mod stability;
 mod table;
 pub mod verdict;
 
-/// The former names of `results`, until `src/command/study.rs` and `benches/equal_error.rs` have the new ones.
-pub mod shelf {
-    pub use super::results::{PEERS, PLANNER, Results as Shelf, STABILITY};
-}
-
 pub use cases::CASES;
 pub use run::{ERRORS, machine, study};
 pub use table::table;
