@@ -18,7 +18,7 @@ use cloudchamber::config::{DeviceArgs, Limits};
 use cloudchamber::study::bench::{Bench, Reads, Run};
 use cloudchamber::study::measure::{Measured, measure};
 use cloudchamber::study::record::{Choice, Line, Point, Record};
-use cloudchamber::study::shelf::{PEERS, Shelf};
+use cloudchamber::study::results::{PEERS, Results};
 use cloudchamber::study::{ERRORS, fit, machine};
 use cloudchamber::volume::{RawQuery, Volume, Voxels};
 use scenes::{FRAMES, SIDE, list, median, modes, synthetic, vtk};
@@ -138,7 +138,7 @@ fn line(name: &str, points: Vec<Point>) -> Line {
 }
 
 /// Measures a volume in a mode and prints its row.
-fn compare(bench: &Bench, shelf: &Shelf, subject: &Subject, mode: &str, parameters: &Value) {
+fn compare(bench: &Bench, results: &Results, subject: &Subject, mode: &str, parameters: &Value) {
     let (volume, own) = (subject.upload(bench), subject.own(parameters));
     let with = |step: f64, more: Value| {
         let mut own = own.clone();
@@ -171,7 +171,7 @@ fn compare(bench: &Bench, shelf: &Shelf, subject: &Subject, mode: &str, paramete
     let ours = lines[..2].iter().flat_map(|l| l.points.iter().map(move |p| (l, p)));
     let best = ours.filter(|(_, p)| p.error.rmse <= vtk.rmse).min_by(|a, b| a.1.device_ms.total_cmp(&b.1.device_ms));
     let best = best.map(|(line, point)| (format!("{}, {} voxels a step", line.name, point.at), point.clone()));
-    shelf.put(&finish(bench, subject, mode, lines)).unwrap();
+    results.put(&finish(bench, subject, mode, lines)).unwrap();
     let Some((setting, best)) = best else {
         return println!("| {} | {mode} | {:.0} ms | {:.2} % | none |", subject.name, 1e3 * vtk_s, 100.0 * vtk.rmse);
     };
@@ -232,13 +232,13 @@ fn main() {
         let flags = Flags::parse_from(["equal_error"]);
         let bench = Bench::new(&flags.device, flags.limits).unwrap();
         let charts = std::env::var_os("CHARTS").map_or_else(|| flags.device.data_dir().join("studies"), PathBuf::from);
-        let shelf = Shelf::new(charts);
+        let results = Results::new(charts);
         let scans = std::env::var("SCANS").unwrap_or_default();
         let scans = scans.split(':').filter(|s| !s.is_empty()).map(|path| Subject::scan(&bench, Path::new(path)));
         println!("| volume | mode | VTK | its error (with no factor) | ours | device | error | device against VTK | wall against VTK |\n|---|---|---|---|---|---|---|---|---|");
         for subject in [Subject::synthetic()].into_iter().chain(scans) {
             for (mode, _, parameters) in modes().into_iter().filter(|(_, t, _)| *t == "emission_absorption") {
-                compare(&bench, &shelf, &subject, mode, &parameters);
+                compare(&bench, &results, &subject, mode, &parameters);
             }
         }
     });

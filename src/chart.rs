@@ -5,10 +5,10 @@ use plotters::prelude::*;
 use crate::error::{Error, Result};
 use crate::job::TracePoint;
 
-/// Relative errors below this are drawn here: a logarithmic axis has no 0.
+/// Relative errors below this are drawn here, since a logarithmic axis has no 0.
 const LEAST_ERROR: f64 = 1e-6;
 
-/// A render's error against time, both on logarithmic axes; previews of fewer pixels are hollow.
+/// A render's error against time, both on logarithmic axes. Previews of fewer pixels are hollow.
 ///
 /// # Errors
 /// [`Error::Internal`] when drawing fails.
@@ -48,14 +48,14 @@ fn draw(svg: &mut String, trace: &[TracePoint], state: &str) -> std::result::Res
     Ok(())
 }
 
-/// The bounds of values above 0 with some room around them, or `none` where there are no values.
+/// The bounds of values above 0 with some room around them, or `none` if there are no values.
 pub fn bounds(values: impl Iterator<Item = f64> + Clone, none: [f64; 2], room: f64) -> std::ops::Range<f64> {
     let least = values.clone().reduce(f64::min).unwrap_or(none[0]) / room;
     let most = values.reduce(f64::max).unwrap_or(none[1]) * room;
     least..most
 }
 
-/// A number as short as it can be read.
+/// A number in its shortest readable form.
 pub fn plain(v: f64) -> String {
     if (0.01..1e5).contains(&v) { format!("{}", (v * 1e4).round() / 1e4) } else { format!("{v:.0e}") }
 }

@@ -1,4 +1,4 @@
-//! The film on the host: what a view has gathered so far, its estimated error, and what is read of its pixels.
+//! The film on the host: the samples that a view has gathered so far, its estimated error, and the numbers that are read from its pixels.
 
 pub mod difference;
 mod estimate;
@@ -19,36 +19,36 @@ pub use sums::{Apart, Sums};
 /// Means and squared deviations of one set of samples, as the device leaves them (`kernels/shared/film.h`).
 #[derive(Debug, Clone, Default)]
 pub struct Samples {
-    /// Width in its own pixels.
+    /// The width in its own pixels.
     pub width: usize,
-    /// Height in its own pixels.
+    /// The height in its own pixels.
     pub height: usize,
-    /// It holds every `stride`-th pixel of the full image.
+    /// The distance of its pixels: it holds every `stride`-th pixel of the full image.
     pub stride: usize,
     /// Samples per pixel.
     pub count: u32,
-    /// Mean linear R, G, B and alpha of every pixel. Empty where it was not read.
+    /// The mean linear R, G, B and alpha of every pixel. It is empty if it was not read.
     pub mean: Vec<f32>,
-    /// Sum of squared deviations of the luminance of every pixel; NaN where a sample was not finite. Empty where it was not read, as of one
-    /// sample that was finite everywhere.
+    /// The sum of squared deviations of the luminance of every pixel; NaN if a sample was not finite. It is empty if it was not read, as
+    /// with one sample that was finite everywhere.
     pub m2: Vec<f32>,
-    /// Samples by tile, where they were put where the error is.
+    /// The samples by tile, if tiles with more error got more samples.
     pub tiles: Option<Tiles>,
 }
 
-/// How often each tile of a picture was sampled.
+/// The number of samples of each tile of a picture.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Tiles {
-    /// Pixels along a tile's side.
+    /// The number of pixels along a tile's side.
     pub side: usize,
-    /// Tiles across.
+    /// The number of tiles across.
     pub wide: usize,
-    /// Samples of each pixel of a tile, row by row.
+    /// The samples of each pixel of a tile, row by row.
     pub counts: Vec<u32>,
 }
 
 impl Tiles {
-    /// Samples of the pixel (x, y).
+    /// The samples of the pixel (x, y).
     pub fn count_at(&self, x: usize, y: usize) -> u32 {
         self.counts[y / self.side * self.wide + x / self.side]
     }
@@ -60,17 +60,17 @@ fn luminance(p: &[f32]) -> f64 {
 }
 
 impl Samples {
-    /// Linear luminance of a pixel.
+    /// The linear luminance of a pixel.
     pub fn luminance(&self, pixel: usize) -> f64 {
         luminance(&self.mean[4 * pixel..])
     }
 
-    /// How many there are.
+    /// The number of pixels.
     pub fn pixels(&self) -> usize {
         self.width * self.height
     }
 
-    /// Samples of a pixel.
+    /// The samples of a pixel.
     fn count_at(&self, pixel: usize) -> u32 {
         match &self.tiles {
             Some(tiles) => tiles.count_at(pixel % self.width, pixel / self.width),
@@ -78,23 +78,23 @@ impl Samples {
         }
     }
 
-    /// Variance of one sample of a pixel's luminance; 0 where there is but one, NaN where a sample was not finite.
+    /// The variance of one sample of a pixel's luminance; 0 for a single sample, NaN if a sample was not finite.
     fn known_variance(&self, pixel: usize) -> f64 {
         let count = self.count_at(pixel);
         if count < 2 { 0.0 } else { f64::from(self.m2[pixel]) / f64::from(count - 1) }
     }
 
-    /// The same, 0 where it is not known.
+    /// The variance of one sample of a pixel's luminance; 0 if it is not known.
     fn variance(&self, pixel: usize) -> f64 {
         Some(self.known_variance(pixel)).filter(|v| v.is_finite()).unwrap_or(0.0)
     }
 
-    /// The square of the standard error of a pixel's luminance; NaN where a sample was not finite.
+    /// The square of the standard error of a pixel's luminance; NaN if a sample was not finite.
     fn squared_error(&self, pixel: usize) -> f64 {
         self.known_variance(pixel) / f64::from(self.count_at(pixel).max(1))
     }
 
-    /// What a pixel adds to the denominator of Welch's degrees of freedom: its squared error's square over its own.
+    /// A pixel's term in the denominator of Welch's degrees of freedom: the square of its squared error over its own degrees of freedom.
     fn error_spread(&self, pixel: usize) -> f64 {
         self.squared_error(pixel).powi(2) / f64::from(self.count_at(pixel).max(2) - 1)
     }
@@ -112,41 +112,42 @@ impl Samples {
     }
 }
 
-/// What a view has gathered: its samples, and those of a control at twice the step on every second pixel.
+/// The samples that a view has gathered, and those of a control at twice the step on every second pixel.
 #[derive(Debug, Clone, Default)]
 pub struct Film {
-    /// Size of the picture asked for.
+    /// The size of the picture asked for.
     pub size: [usize; 2],
-    /// The samples; `stride` is 1 but for a preview. The pixels themselves are there where somebody asked for them.
+    /// The samples; `stride` is 1 but for a preview. The pixels themselves are there only if somebody asked for them.
     pub main: Samples,
-    /// What its error is made of.
+    /// The sums from which its error is computed.
     pub sums: Sums,
     /// The control, if there is one yet.
     pub control: Option<Samples>,
-    /// True if a sample of the control is that of the same number of the others but for its step: nothing random is in them.
+    /// True if a sample of the control is that of the same number of the others but for its step. Then nothing is random in their
+    /// difference.
     pub paired: bool,
-    /// True if the step plays no part in the picture: there is no error of it.
+    /// True if the step plays no part in the picture, so that it causes no error.
     pub stepless: bool,
-    /// True if its samples are random: of one sample the error is told from how neighbours differ.
+    /// True if its samples are random. With one sample, the error is estimated from the differences of neighbours.
     pub noisy: bool,
-    /// Opacity at which rays end.
+    /// The opacity at which rays end.
     pub opacity_threshold: f64,
-    /// Relative change of the picture since the field had half its histories.
+    /// The relative change of the picture since the field had half its histories.
     pub field_error: Option<f64>,
-    /// What is behind the volume.
+    /// The background behind the volume.
     pub background: Background,
-    /// What was lowered of it, so that it came in time,
+    /// The quality that was reduced so that the picture came in time.
     pub lowered: Lowered,
-    /// and what the longer step loses, relative, where that is known.
+    /// The loss of the longer step, relative, if it is known.
     pub step_loss: Option<f64>,
-    /// What half of the samples differ by from the others, once that is known.
+    /// The difference of half of the samples to all of them, once it is known.
     pub(crate) halves: Option<Halves>,
-    /// What a pilot had come to on the way.
+    /// The rounds of a pilot.
     pub(crate) rounds: Vec<Arc<Round>>,
 }
 
 impl Film {
-    /// Relative root-mean-square difference in luminance to another film of the same size, where both have their pixels.
+    /// The relative root-mean-square difference in luminance to another film of the same size, if both have their pixels.
     pub fn difference(&self, other: &Film) -> Option<f64> {
         if self.main.mean.len() != other.main.mean.len() || self.main.stride != other.main.stride {
             return None;
@@ -157,24 +158,24 @@ impl Film {
         Some(self.relative(rms))
     }
 
-    /// By the mean luminance, where that is above 0.
+    /// Divides an error by the mean luminance, if that is above 0.
     fn relative(&self, absolute: f64) -> f64 {
         let mean = self.sums.luminance / self.main.pixels().max(1) as f64;
         if mean > 0.0 { absolute / mean } else { absolute }
     }
 
-    /// What half the resolution would lose, interpolated to this one, relative.
+    /// The loss of half the resolution, interpolated to this one, relative.
     pub fn resolution_loss(&self) -> f64 {
         self.relative(self.sums.of_every_second())
     }
 
-    /// What twice the step lost at the control's pixels, relative; with the noise of both.
+    /// The loss of twice the step at the control's pixels, relative, with the noise of both.
     pub fn step_loss_seen(&self) -> Option<f64> {
         let apart = self.sums.control?;
         Some(self.relative((apart.squared / apart.pixels.max(1) as f64).sqrt()))
     }
 
-    /// Bytes of the film on the device.
+    /// The bytes of the film on the device.
     pub fn bytes(&self) -> usize {
         let held = |s: &Samples| 20 * s.pixels();
         held(&self.main) + self.control.as_ref().map_or(0, held)

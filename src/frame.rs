@@ -1,4 +1,4 @@
-//! A picture with its description as PNG or OpenEXR bytes.
+//! The encoding of a picture with its description as PNG or OpenEXR bytes.
 
 mod stripes;
 
@@ -11,8 +11,8 @@ use exr::prelude::{
 use crate::error::{Error, Result};
 use stripes::Deflated;
 
-/// 8-bit sRGB, three or four bytes a pixel, as PNG, by a fast encoder: a frame is looked at once. `description` goes into its text chunk,
-/// under the keyword `Cloudchamber`.
+/// Encodes 8-bit sRGB, three or four bytes a pixel, as PNG, by a fast encoder, since a frame is looked at once. `description` goes into its
+/// text chunk, under the keyword `Cloudchamber`.
 ///
 /// # Errors
 /// [`Error::Internal`] when the encoder fails.
@@ -21,7 +21,7 @@ pub fn png(size: [usize; 2], picture: &[u8], description: String) -> Result<Vec<
     Deflated::new(size, channels, picture)?.png(description)
 }
 
-/// Linear RGB, or RGB and alpha, in 32-bit floats as OpenEXR, with a channel `standard_error` of the luminance where it is given;
+/// Encodes linear RGB, or RGB and alpha, in 32-bit floats as OpenEXR, with a channel `standard_error` of the luminance if it is given.
 /// `description` goes into its comments.
 ///
 /// # Errors
@@ -41,7 +41,7 @@ pub fn exr(
     let channels = AnyChannels::sort(colours.chain(errors).collect());
     let mut attributes = LayerAttributes::named("cloudchamber");
     attributes.comments = exr::prelude::Text::new_or_none(description);
-    // Blocks are compressed side by side. Written in a fixed order, the same film is the same bytes.
+    // Blocks are compressed side by side. They are written in a fixed order, so that the same film gives the same bytes.
     let encoding = Encoding { line_order: LineOrder::Increasing, ..Encoding::FAST_LOSSLESS };
     let layer = Layer::new((width, height), attributes, encoding, channels);
     let mut bytes = std::io::Cursor::new(Vec::new());
@@ -57,7 +57,7 @@ pub fn etag(bytes: &[u8]) -> String {
 /// The text chunk of one of our PNGs, for the command line and tests.
 ///
 /// # Errors
-/// [`Error::Malformed`] when it is not one.
+/// [`Error::Malformed`] if the bytes are not one of our PNGs.
 pub fn read_description(png_bytes: &[u8]) -> Result<Cow<'static, str>> {
     let decoder = png::Decoder::new(std::io::Cursor::new(png_bytes));
     let reader = decoder.read_info().map_err(|e| Error::Malformed(e.to_string()))?;

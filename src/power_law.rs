@@ -1,16 +1,16 @@
 //! Power laws through measured points: lines on logarithmic axes.
 
-/// y = factor x^power.
+/// The law y = factor x^power.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PowerLaw {
-    /// y at x = 1.
+    /// The value of y at x = 1.
     pub factor: f64,
     /// The slope on logarithmic axes.
     pub power: f64,
 }
 
 impl PowerLaw {
-    /// The least-squares line of ln y over ln x; none through fewer than three points, or through any that is not above 0.
+    /// The least-squares line of ln y over ln x; `None` for fewer than three points, or if a coordinate is not above 0.
     pub fn through(points: &[(f64, f64)]) -> Option<Self> {
         if points.len() < 3 || points.iter().any(|(x, y)| !(*x > 0.0 && *y > 0.0)) {
             return None;
@@ -23,7 +23,7 @@ impl PowerLaw {
         power.is_finite().then_some(Self { factor: (my - power * mx).exp(), power })
     }
 
-    /// y at x.
+    /// The value of y at x.
     pub fn at(&self, x: f64) -> f64 {
         self.factor * x.powf(self.power)
     }
@@ -45,7 +45,7 @@ mod tests {
             assert!((slope(&law(power)).unwrap_or(9.0) - power).abs() < 1e-12);
         }
         assert!((PowerLaw::through(&law(-0.5)).map_or(0.0, |l| l.at(100.0)) - 0.7).abs() < 1e-12);
-        // A floor that noise does not fall below: no slope of a half any more.
+        // With a floor that noise does not fall below, the slope is not a half any more.
         let floored: Vec<(f64, f64)> = law(-0.5).iter().map(|p| (p.0, p.1.max(3.0))).collect();
         assert!(slope(&floored).unwrap_or(0.0) > -0.4);
         assert_eq!(slope(&law(1.0)[..2]), None);

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use crate::config::{DeviceArgs, Limits};
 use crate::error::{Error, Result};
 use crate::study;
-use crate::study::shelf::{PLANNER, STABILITY, Shelf};
+use crate::study::results::{PLANNER, Results, STABILITY};
 
 /// What `study` is told.
 #[derive(clap::Args)]
@@ -28,7 +28,7 @@ pub(super) struct Arguments {
     limits: Limits,
 }
 
-/// Runs the cases asked for and puts what each came to on the shelf.
+/// Runs the cases asked for and stores their results.
 ///
 /// # Errors
 /// Those of the requests, of the folder, and one where a method is wrong and silent.
@@ -47,14 +47,14 @@ pub(super) fn study(args: &Arguments) -> Result<()> {
             .collect();
         return Err(Error::internal(format!("there is no such case; there are: {}", names.join(", "))));
     }
-    let shelf = Shelf::new(args.output.clone().unwrap_or_else(|| args.device.data_dir().join("studies")));
+    let results = Results::new(args.output.clone().unwrap_or_else(|| args.device.data_dir().join("studies")));
     let bench = study::bench::Bench::new(&args.device, args.limits.clone())?;
     let scale = if args.quick { study::Scale::Quick } else { study::Scale::Full };
     let mut told = |line: &str| eprintln!("{line}");
     for case in cases {
         match study::study(&bench, case, scale, &mut told)? {
             Ok(record) => {
-                shelf.put(&record)?;
+                results.put(&record)?;
                 print!("{}", study::table(&record));
             }
             Err(why) => println!("{}: left out: {why}", case.name),
@@ -66,17 +66,17 @@ pub(super) fn study(args: &Arguments) -> Result<()> {
         if let Some(silent) = found.experiments.iter().find(|e| !e.verdict.is_told()) {
             return Err(Error::internal(format!("{}: a method is wrong and silent", silent.name)));
         }
-        shelf.put_stability(found)?;
+        results.put_stability(found)?;
     }
     if asked(PLANNER) {
         let scenes = args.scenes.clone().unwrap_or(0..scale.pick(10, 110));
         for scene in scenes {
             // Each is written at once: all of them take long.
-            let all = shelf.put_planned(study::planner::planner(&bench, scene..scene + 1, &mut told)?)?;
+            let all = results.put_planned(study::planner::planner(&bench, scene..scene + 1, &mut told)?)?;
             let ([met, timed, cheap], n) = (all.figures(), all.scenes.len());
             told(&format!("of {n} plans {met} meet the error, {timed} the time, {cheap} the cost"));
         }
     }
-    println!("written to {}", shelf.folder().display());
+    println!("written to {}", results.folder().display());
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! Tells by z of every pixel's luminance if two films are of the same picture.
+//! A test by z of every pixel's luminance that two films are of the same picture.
 
 use serde::Serialize;
 
@@ -6,32 +6,32 @@ use super::Film;
 use crate::error::{Error, Result};
 use crate::frame;
 
-/// The chance that noise alone makes any pixel differ, over which a pixel counts as different.
+/// The significance level: the chance that noise alone makes any pixel count as different.
 const ALPHA: f64 = 0.01;
-/// |z| that is drawn in full colour.
+/// The |z| that is drawn in full colour.
 const FULL_COLOUR: f64 = 4.0;
 
 /// The judgement of two films of one size. t = (a − b) / √(s_a² + s_b²), with the standard errors of both pixels, follows Student's
-/// distribution with Welch's degrees of freedom ν = (s_a² + s_b²)² / (s_a⁴ / (n_a − 1) + s_b⁴ / (n_b − 1)); z is the normal variable as
-/// improbable, √(ν ln(1 + t²/ν)) (8ν + 1) / (8ν + 3) (Wallace, Ann. Math. Stat. 30, 1959).
+/// distribution with Welch's degrees of freedom ν = (s_a² + s_b²)² / (s_a⁴ / (n_a − 1) + s_b⁴ / (n_b − 1)). z is the equally improbable
+/// normal variable, √(ν ln(1 + t²/ν)) (8ν + 1) / (8ν + 3) (Wallace, Ann. Math. Stat. 30, 1959).
 #[derive(Debug, Clone, Serialize)]
 pub struct Difference {
-    /// Pixels that were compared: all whose error is known, or that have none.
+    /// The number of compared pixels: all pixels whose error is known or 0.
     pub pixels: usize,
-    /// Pixels whose error is not known, since a sample was not finite.
+    /// The number of pixels whose error is not known, since a sample was not finite.
     pub unknown: usize,
-    /// Pixels beyond the two-sided level of 1 − (1 − α)^(1/pixels), α = 0.01 (Šidák, JASA 62, 1967).
+    /// The number of pixels beyond the two-sided level of 1 − (1 − α)^(1/pixels), α = 0.01 (Šidák, JASA 62, 1967).
     pub beyond: usize,
-    /// Mean luminance of the first less that of the second,
+    /// The mean luminance of the first film less that of the second.
     pub mean_difference: f64,
-    /// and its standard error.
+    /// The standard error of `mean_difference`.
     pub mean_difference_error: f64,
-    /// The mean of z²: 1 for noise of known size; less, where the pixels' own samples differ by more than noise, as at edges.
+    /// The mean of z². It is 1 for noise of known size, and less if the pixels' own samples differ by more than noise, as at edges.
     pub mean_z_squared: f64,
-    /// The probability of a difference of the means as large as this, or of a Σ z² as large as this, by noise alone: the lesser of the
-    /// two, corrected for being one of two.
+    /// The probability of a difference of the means as large as this, or of a Σ z² as large as this, by noise alone. It is the lesser of
+    /// the two, corrected for being one of two.
     pub p_value: f64,
-    /// At least 99.75 % of the pixels are within the level.
+    /// True if at least 99.75 % of the pixels are within the level.
     pub agree: bool,
     #[serde(skip)]
     z: Vec<f64>,
@@ -44,20 +44,20 @@ fn two_sided(z: f64) -> f64 {
     libm::erfc(z.abs() / std::f64::consts::SQRT_2)
 }
 
-/// The probability of a χ² of `n` degrees of freedom beyond `x` (Wilson & Hilferty, PNAS 17, 1931).
+/// The probability that a χ² variable of `n` degrees of freedom is beyond `x` (Wilson & Hilferty, PNAS 17, 1931).
 fn chi_squared_tail(x: f64, n: f64) -> f64 {
     let spread = 2.0 / (9.0 * n);
     0.5 * libm::erfc(((x / n).cbrt() - 1.0 + spread) / (2.0 * spread).sqrt())
 }
 
-/// The standard normal variable that is as improbable as Student's t of so many degrees of freedom.
+/// The standard normal variable that is as improbable as Student's t of `freedom` degrees of freedom.
 fn normal_score(t: f64, freedom: f64) -> f64 {
     let freedom = freedom.clamp(1.0, 1e6);
     let z = (freedom * (t * t / freedom).ln_1p()).sqrt() * (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0);
     z.copysign(t)
 }
 
-/// The chance of the lesser of `n` independent p-values.
+/// The probability that the least of `n` independent p-values is as low as `p`.
 fn least_of(p: f64, n: f64) -> f64 {
     -(n * (-p).ln_1p()).exp_m1()
 }
@@ -66,7 +66,7 @@ impl Film {
     /// Compares this film with another one.
     ///
     /// # Errors
-    /// [`Error::Conflict`] where the two are not pictures of one size with two samples or more.
+    /// [`Error::Conflict`] if the two are not pictures of one size with two samples or more.
     pub fn compare(&self, other: &Film) -> Result<Difference> {
         for film in [self, other] {
             if film.main.stride != 1 || film.main.count < 2 {
@@ -115,8 +115,8 @@ impl Film {
 }
 
 impl Difference {
-    /// The map of z as PNG: white where the two are the same, red where the first is brighter, blue where the second is; grey where the
-    /// error is not known.
+    /// The map of z as PNG. A pixel is white if the two films are the same, red if the first is brighter, blue if the second is, and grey
+    /// if the error is not known.
     ///
     /// # Errors
     /// [`Error::Internal`] when the encoder fails.
@@ -173,7 +173,7 @@ mod tests {
         let same = film(|i| 1.0 + noise(i, 1)).compare(&film(|i| 1.0 + noise(i, 2)))?;
         assert!(same.agree && same.beyond == 0 && same.p_value > 0.01, "{}", same.p_value);
         assert!((same.mean_z_squared - 1.0).abs() < 0.1, "{}", same.mean_z_squared);
-        // A twelfth of a pixel's error: seen in the mean alone.
+        // A shift of a twelfth of a pixel's error is seen in the mean alone.
         let shifted = film(|i| 1.008 + noise(i, 1)).compare(&film(|i| 1.0 + noise(i, 2)))?;
         assert!(shifted.agree && shifted.p_value < 1e-4, "{}", shifted.p_value);
         let spotted =

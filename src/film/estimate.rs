@@ -1,4 +1,4 @@
-//! How wrong a film is, as far as it can tell from itself.
+//! The error of a film, estimated from the film itself.
 
 use serde::Serialize;
 
@@ -6,27 +6,27 @@ use super::Film;
 use super::rounds::SURE;
 use super::sums::Apart;
 
-/// The estimated error of a picture: root mean square over its pixels of the error of linear luminance, divided by the
-/// picture's mean luminance (absolute where that is 0). A part is null where it is not known apart from the others.
+/// The estimated error of a picture: root mean square over its pixels of the error of linear luminance, divided by the picture's mean
+/// luminance (absolute if that is 0). A part is null if it is not known apart from the others.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Default)]
 pub struct ErrorEstimate {
-    /// All parts together.
+    /// The error of all parts together.
     pub total: f64,
-    /// Standard error of the mean over the samples; where the halves of them agree better than those of random ones would, as where the
-    /// places in a pixel are spread evenly over an edge, what the halves differ by.
+    /// The standard error of the mean over the samples. If the halves of the samples agree better than those of random ones would, it is
+    /// the difference of the halves instead. They do so if the places in a pixel are spread evenly over an edge.
     pub noise: Option<f64>,
     /// The difference that halving the step made, less its noise.
     pub discretisation: Option<f64>,
-    /// What a picture of fewer pixels than asked for leaves out.
+    /// The loss of a picture of fewer pixels than asked for.
     pub resolution: Option<f64>,
-    /// What lies behind the opacity at which rays end.
+    /// The contribution from behind the opacity at which rays end.
     pub truncation: Option<f64>,
-    /// What a field that is still being computed contributes: the change since it had half its histories.
+    /// The contribution of a field that is still being computed: the change since it had half its histories.
     pub field: Option<f64>,
 }
 
 impl Film {
-    /// The error as it can be told from the samples alone.
+    /// The error, estimated from the samples alone.
     pub fn error(&self) -> ErrorEstimate {
         let sums = &self.sums;
         let pixels = self.main.pixels().max(1) as f64;
@@ -34,7 +34,7 @@ impl Film {
         let relative = |absolute: f64| if mean > 0.0 { absolute / mean } else { absolute };
         let block = sums.of_blocks();
         let noise = match self.main.count {
-            // Of noise a 2×2 block's mean takes a quarter of the variance away.
+            // The mean of a 2×2 block takes a quarter of the noise's variance away.
             0 | 1 => self.noisy.then(|| block * (4.0f64 / 3.0).sqrt()),
             _ => Some(self.known_noise(SURE).0),
         };
@@ -61,25 +61,25 @@ impl Film {
         }
     }
 
-    /// The standard error of the mean over random samples, of luminance, root mean square over the pixels; and how many pixels it is of:
-    /// (Σ sᵢ²)² / Σ sᵢ⁴.
+    /// The standard error of the mean over random samples, of luminance, root mean square over the pixels; and the effective number of its
+    /// pixels, (Σ sᵢ²)² / Σ sᵢ⁴.
     pub(crate) fn random_noise(&self) -> (f64, f64) {
         let (sum, squares) = (self.sums.noise, self.sums.noise_squares);
         ((sum / self.main.pixels().max(1) as f64).sqrt(), if squares > 0.0 { sum * sum / squares } else { 0.0 })
     }
 
-    /// The noise, and whether the samples are spread better than random ones, by so many `deviations`.
+    /// The noise, and true if the samples are spread better than random ones by at least `deviations` deviations.
     pub(crate) fn known_noise(&self, deviations: f64) -> (f64, bool) {
         let (random, pixels) = self.random_noise();
         let spread = self.halves.and_then(|h| h.noise(self.main.count, random, pixels, deviations));
         spread.map_or((random, false), |noise| (noise, true))
     }
 
-    /// The difference to the control, whose step is twice as long. A method of first order or better is at most this wrong:
-    /// |I(h) − I| ≤ |I(2h) − I(h)|. With two samples or more the noise of both is taken off and the rest is discretisation;
-    /// with one sample the two cannot be told apart, and the second value is both together. Samples that are paired have their
-    /// noise in common: what the m of the control and the n proper differ by without a change of step is that of the n − m that
-    /// only one has, with a variance of 1/m − 1/n of a sample's.
+    /// The difference to the control, whose step is twice as long. A method of first order or better is at most this wrong: |I(h) − I| ≤
+    /// |I(2h) − I(h)|. With two samples or more the noise of both is taken off and the rest is discretisation. With one sample the two
+    /// cannot be told apart, and the second value is both together. Paired samples have their noise in common. Without a change of step,
+    /// the m samples of the control and the n proper ones differ only by the n − m that one of them lacks, with a variance of 1/m − 1/n of
+    /// a sample's.
     fn against(&self, control_samples: u32, apart: &Apart) -> (Option<f64>, Option<f64>) {
         let (n, m) = (f64::from(self.main.count), f64::from(control_samples));
         let pixels = apart.pixels.max(1) as f64;
@@ -96,7 +96,7 @@ mod tests {
     use super::super::{Samples, Sums};
     use super::*;
 
-    /// A film of 2 × 2 pixels of one luminance, with so many samples of one variance each, and a control of another luminance.
+    /// A film of 2 × 2 pixels of one luminance, with `count` samples of one variance each, and a control of another luminance.
     fn film(luminance: f64, count: u32, variance: f64, control: Option<(f64, u32)>) -> Film {
         let set = |count| Samples { width: 2, height: 2, stride: 1, count, ..Samples::default() };
         let squared = variance / f64::from(count);
@@ -133,7 +133,7 @@ mod tests {
 
     #[test]
     fn paired_samples_have_their_noise_in_common() {
-        // As many samples of both: what they differ by is the step's doing, whatever the noise.
+        // With as many samples of both, the difference is due to the step alone, whatever the noise.
         let film = |paired: bool| Film { paired, ..film(0.5, 4, 0.09, Some((0.6, 4))) };
         assert!((film(true).error().discretisation.unwrap_or(0.0) - 0.2).abs() < 1e-12);
         assert_eq!(film(false).error().discretisation, Some(0.0));

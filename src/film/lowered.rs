@@ -1,11 +1,11 @@
-//! The quality that a picture lacks because it had to come in time.
+//! The loss of quality of a picture that had to come in time.
 
-/// What a frame has less of than was asked for.
+/// The reductions of a frame against the one that was asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lowered {
-    /// Pixels that a sample stands for, along a side.
+    /// The number of pixels along a side that one sample stands for.
     pub stride: u32,
-    /// The step, of the one that was asked for.
+    /// The step as a multiple of the one that was asked for.
     pub step: f32,
 }
 
@@ -16,12 +16,12 @@ impl Default for Lowered {
 }
 
 impl Lowered {
-    /// True if it lacks nothing.
+    /// True if nothing is reduced.
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }
 
-    /// In words, for a reader.
+    /// The reductions in words, for a reader.
     pub fn words(&self) -> Vec<String> {
         let mut words = Vec::new();
         if self.stride > 1 {

@@ -1,4 +1,4 @@
-//! The picture of a film: as PNG of what the device encoded, or in linear floats over its background.
+//! The picture of a film: as PNG from the device's encoded bytes, or in linear floats over its background.
 
 use std::borrow::Cow;
 
@@ -6,12 +6,12 @@ use super::{ErrorEstimate, Film, srgb};
 use crate::error::Result;
 use crate::frame;
 
-/// What is behind the volume.
+/// The background behind the volume.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Background {
     /// A linear colour.
     Colour([f32; 3]),
-    /// Nothing: the picture has an alpha channel.
+    /// No background: the picture has an alpha channel.
     Transparent,
 }
 
@@ -22,14 +22,15 @@ impl Default for Background {
 }
 
 impl Background {
-    /// Of a picture with it.
+    /// The number of channels of a picture with this background.
     pub fn channels(self) -> usize {
         if self == Self::Transparent { 4 } else { 3 }
     }
 }
 
 impl Film {
-    /// What a picture of this film says of itself. No times: the same request and number of samples gives the same bytes.
+    /// The description in the metadata of a picture of this film. It has no times, so that the same request and number of samples gives the
+    /// same bytes.
     pub fn description(&self, error: &ErrorEstimate) -> String {
         let stride = self.main.stride;
         serde_json::json!({"samples": self.main.count, "error": error.total, "error_parts": error, "stride": stride,
@@ -37,7 +38,7 @@ impl Film {
         .to_string()
     }
 
-    /// Its picture, in the bytes that the device encoded, as PNG; and the film's error.
+    /// The picture as PNG, from the bytes that the device encoded, and the film's error.
     ///
     /// # Errors
     /// `Error::Internal` when the encoder fails.
@@ -46,8 +47,8 @@ impl Film {
         Ok((frame::png(self.size, picture, self.description(&error))?, error))
     }
 
-    /// The film as OpenEXR bytes; a transparent one has an alpha channel and is premultiplied, as is usual there. Of two samples or more
-    /// each pixel says the standard error of its luminance, or that it is no number where a sample was not finite.
+    /// The film as OpenEXR bytes. A transparent film has an alpha channel and is premultiplied, as is usual there. With two samples or
+    /// more, each pixel gives the standard error of its luminance, or NaN if a sample was not finite.
     ///
     /// # Errors
     /// `Error::Internal` when the encoder fails.
@@ -61,7 +62,7 @@ impl Film {
         frame::exr(self.size, &picture, errors, &self.description(&self.error()))
     }
 
-    /// All samples in linear R, G, B (premultiplied) and alpha, row by row from the top; a preview is interpolated to the full size.
+    /// All samples in linear R, G, B (premultiplied) and alpha, row by row from the top. A preview is interpolated to the full size.
     fn rgba(&self) -> Cow<'_, [f32]> {
         let [width, height] = self.size;
         if self.main.stride == 1 && self.size == [self.main.width, self.main.height] {

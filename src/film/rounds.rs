@@ -1,17 +1,17 @@
-//! A picture on its way: what it was after fewer samples tells how well it is known, whatever its samples have in common.
+//! The rounds of a picture. The difference to the picture after fewer samples tells its error, whatever its samples have in common.
 
-/// Halves that differ by less than this part of what random ones would are not random,
+/// The halves are not random if their difference is less than this part of the difference of random halves.
 const WELL_SPREAD: f64 = 0.9;
-/// if that is not by chance: by so many deviations of the square of what random ones would differ by.
+/// The number of deviations of the squared difference of random halves by which the halves must be closer, so that this is not by chance.
 pub(crate) const SURE: f64 = 4.0;
 
-/// True if a picture is looked at after so many samples: 1, 2, 3, 4, 6, 8, 12, …
+/// True if a picture has a round after this number of samples: 1, 2, 3, 4, 6, 8, 12, …
 pub(crate) fn is_round(samples: u32) -> bool {
     samples.is_power_of_two() || (samples.is_multiple_of(3) && (samples / 3).is_power_of_two())
 }
 
-/// After how many samples a pilot is looked at: 1, 2, 3, 4, 6, then every fourth to 64 and every eighth part of an octave from there. How
-/// well evenly spread places do goes up and down between these.
+/// The numbers of samples after which a pilot has a round: 1, 2, 3, 4, 6, then every fourth to 64 and every eighth part of an octave from
+/// there. The quality of evenly spread places goes up and down between these.
 pub(crate) fn pilot_rounds() -> impl Iterator<Item = u32> {
     (1..5)
         .chain([6])
@@ -31,33 +31,33 @@ pub(crate) struct Round {
 }
 
 impl Round {
-    /// The root mean square of the difference to another.
+    /// The root mean square of the difference to another round.
     pub fn apart(&self, other: &Round) -> f64 {
         let squares = self.luminance.iter().zip(&other.luminance).map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2));
         (squares.sum::<f64>() / self.luminance.len().max(1) as f64).sqrt()
     }
 }
 
-/// What the first half of the samples differs by from all of them, A − (A + B) / 2. Of random samples its square is the variance of the
-/// mean itself. Where samples are spread evenly, as the places in a pixel are, the mean converges faster than theirs would, and the two
-/// halves differ by less, yet by no less than the mean is wrong: each of them is wrong by more than the mean of both.
+/// The difference of the first half of the samples to all of them, A − (A + B) / 2. For random samples its square is the variance of the
+/// mean itself. If samples are spread evenly, as the places in a pixel are, the mean converges faster than with random ones, and the two
+/// halves differ by less. They still differ by no less than the error of the mean, since each half is wrong by more than the mean of both.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Halves {
-    /// Samples of both.
+    /// The number of samples of both halves.
     pub samples: u32,
-    /// Root mean square over the pixels, of luminance.
+    /// The root mean square of the difference over the pixels, of luminance.
     pub apart: f64,
 }
 
 impl Halves {
-    /// Of the picture after half of its samples, and after all of them.
+    /// The halves from the picture after half of its samples and the picture after all of them.
     pub fn of(half: &Round, all: &Round) -> Self {
         Self { samples: all.samples, apart: half.apart(all) }
     }
 
-    /// The noise after `samples` of which random ones would have `random`, where that is clearly less; more samples are taken to be
-    /// random. Of random halves the square is `random`² on average, with a relative variance of 2/ν, where the `pixels` that matter,
-    /// ν = (Σ sᵢ²)² / Σ sᵢ⁴, may be few: those that a firefly met.
+    /// The noise after `samples`, if it is clearly less than `random`, the noise of random samples. More samples are taken to be random.
+    /// For random halves the square is `random`² on average, with a relative variance of 2/ν. The number of `pixels` that matter, ν = (Σ
+    /// sᵢ²)² / Σ sᵢ⁴, may be small if only a few pixels met a firefly.
     pub fn noise(&self, samples: u32, random: f64, pixels: f64, deviations: f64) -> Option<f64> {
         let noise = self.apart * (f64::from(self.samples) / f64::from(samples)).sqrt();
         let by_chance = 1.0 - deviations * (2.0 / pixels.max(1.0)).sqrt();

@@ -1,47 +1,48 @@
-//! What the error of a film is made of: sums over its pixels, which the device works out (`kernels/encode.cl`).
+//! The sums over a film's pixels from which its error is computed. The device works them out (`kernels/encode.cl`).
 
 /// Sums over the samples of a film.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Sums {
-    /// Of linear luminance.
+    /// The sum of linear luminance.
     pub luminance: f64,
-    /// Of luminance times the pixel's number of samples.
+    /// The sum of luminance times the pixel's number of samples.
     pub weighted: f64,
-    /// Of the square of what lies at most behind the opacity at which rays end: what is in front of it, times what still gets through.
+    /// The sum of the square of the most that may lie behind the opacity at which rays end: the luminance in front of it, times the
+    /// transmittance that is left.
     pub truncated: f64,
-    /// Of the square sᵢ² of a pixel's standard error where it is known,
+    /// The sum of the square sᵢ² of a pixel's standard error, if it is known.
     pub noise: f64,
-    /// and of sᵢ⁴.
+    /// The sum of sᵢ⁴.
     pub noise_squares: f64,
-    /// Of the mean squared deviation from the mean of each block of 2 × 2 pixels,
+    /// The sum of the mean squared deviation from the mean of each block of 2 × 2 pixels.
     pub blocks: f64,
-    /// and how many blocks there are.
+    /// The number of these blocks.
     pub block_count: usize,
-    /// Of the squared difference of every second pixel of a row to the mean of its neighbours,
+    /// The sum of the squared difference of every second pixel of a row to the mean of its neighbours.
     pub between: f64,
-    /// over so many pixels: all that have both neighbours in their part of a row.
+    /// The number of pixels of `between`: all that have both neighbours in their part of a row.
     pub pixels_between: u64,
-    /// Pixels of which a sample was not finite.
+    /// The number of pixels with a sample that was not finite.
     pub unknown: u64,
-    /// Values of the picture that were clipped at white.
+    /// The number of values of the picture that were clipped at white.
     pub clipped: u64,
-    /// Against the control, where there is one.
+    /// The comparison with the control, if there is one.
     pub control: Option<Apart>,
 }
 
-/// The samples against those of a control, at the control's pixels.
+/// The difference of the samples to those of a control, at the control's pixels.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Apart {
-    /// Sum of the squared differences of luminance,
+    /// The sum of the squared differences of luminance.
     pub squared: f64,
-    /// of the variance of one sample, where it is known,
+    /// The sum of the variance of one sample, if it is known.
     pub variance: f64,
-    /// over so many pixels.
+    /// The number of pixels in these sums.
     pub pixels: usize,
 }
 
 impl std::iter::Sum for Sums {
-    /// Of parts of the pixels; what is known of the whole alone is the first's.
+    /// Adds the sums of parts of the pixels. The comparison with the control is known only for the whole, so it is that of the first part.
     fn sum<I: Iterator<Item = Self>>(parts: I) -> Self {
         parts.fold(Self::default(), |a, b| Self {
             luminance: a.luminance + b.luminance,
@@ -61,14 +62,14 @@ impl std::iter::Sum for Sums {
 }
 
 impl Sums {
-    /// Root mean square of the deviation from the mean of each 2×2 block: what half the resolution would lose, which bounds
-    /// what this resolution loses on a picture that is smooth at its scale.
+    /// The root mean square of the deviation from the mean of each 2×2 block. Half the resolution would lose this much. It bounds the loss
+    /// of this resolution on a picture that is smooth at its scale.
     pub(super) fn of_blocks(&self) -> f64 {
         (self.blocks / self.block_count.max(1) as f64).sqrt()
     }
 
-    /// Root mean square of what is lost where only every second pixel of every second row is there and the others are interpolated: across
-    /// for a quarter of the pixels, down for a quarter, both for a quarter.
+    /// The root mean square of the loss if only every second pixel of every second row is there and the others are interpolated: across for
+    /// a quarter of the pixels, down for a quarter, both for a quarter.
     pub(super) fn of_every_second(&self) -> f64 {
         (self.between / self.pixels_between.max(1) as f64).sqrt()
     }

@@ -1,25 +1,25 @@
 //! PNG in stripes of rows, deflated side by side and joined into one zlib stream (RFC 1950, 1951).
 //!
-//! `fdeflate` writes a stream of one block with a fixed code. A stripe's block loses its mark of the last one, and an empty stored
-//! block behind it brings the next to a byte's boundary. A stripe's first row is filtered without the row above, so that stripes
-//! need nothing of each other.
+//! `fdeflate` writes a stream of one block with a fixed code. A stripe's block loses its mark of the last one, and an empty stored block
+//! behind it brings the next to a byte's boundary. A stripe's first row is filtered without the row above, so that stripes are independent
+//! of each other.
 
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
 
-/// Pixels of a stripe at least: the code's description takes 71 bytes of each.
+/// The least number of pixels of a stripe. The code's description takes 71 bytes of each stripe.
 const LEAST_PIXELS: usize = 1 << 13;
-/// Stripes of a picture at most: enough for the cores of one host.
+/// The most stripes of a picture: enough for the cores of one host.
 const MOST_STRIPES: usize = 128;
-/// Filter types of the PNG specification, section 9.
+/// The filter types of the PNG specification, section 9.
 const SUB: u8 = 1;
 const PAETH: u8 = 4;
-/// What a block may start with, and an Adler-32 ends with, in bytes.
+/// The length in bytes of the header at the start of a zlib stream, and of the Adler-32 at its end.
 const ZLIB_HEADER: usize = 2;
 const CHECKSUM: usize = 4;
 
-/// Rows of a stripe, by the picture's size alone.
+/// The number of rows of a stripe. It depends on the picture's size alone.
 fn rows([width, height]: [usize; 2]) -> usize {
     let pixels = (width * height).div_ceil(MOST_STRIPES).max(LEAST_PIXELS);
     pixels.div_ceil(width.max(1))
@@ -35,9 +35,9 @@ pub struct Deflated {
 /// A stripe as a part of a zlib stream.
 struct Stripe {
     bytes: Vec<u8>,
-    /// Adler-32 of the filtered rows,
+    /// The Adler-32 of the filtered rows.
     adler: u32,
-    /// which are so many bytes.
+    /// The number of bytes of the filtered rows.
     length: usize,
 }
 
@@ -80,7 +80,7 @@ impl Deflated {
     }
 }
 
-/// Where a stripe is.
+/// The place of a stripe in the stream.
 #[derive(Clone, Copy)]
 struct Place {
     first: bool,
@@ -99,14 +99,14 @@ fn deflate(pixels: &[u8], row: usize, channels: usize, place: Place) -> Result<S
     join(stream, place, pixels.len() + pixels.len() / row).ok_or_else(|| Error::internal("fdeflate wrote no stream"))
 }
 
-/// A stream of one block of `fdeflate`, as a part of a longer one.
+/// Makes a stream of one block of `fdeflate` a part of a longer stream.
 fn join(mut bytes: Vec<u8>, place: Place, length: usize) -> Option<Stripe> {
     let adler = u32::from_be_bytes(*bytes.last_chunk::<CHECKSUM>()?);
     bytes.truncate(bytes.len() - CHECKSUM);
     if !place.last {
         *bytes.get_mut(ZLIB_HEADER)? &= !1;
-        // `fdeflate` codes the end of a block as 1111 1111 0001, and zeros fill the byte from above. A stored block starts with three bits of 0 and goes
-        // on at the next byte with its length, 0, and the complement of that.
+        // `fdeflate` codes the end of a block as 1111 1111 0001, and zeros fill the byte from above. A stored block starts with three bits
+        // of 0 and goes on at the next byte with its length, 0, and the complement of that.
         let padding = bytes.last().map(|byte| byte.leading_zeros()).filter(|zeros| *zeros < u8::BITS)?;
         bytes.extend_from_slice(if padding < 3 { &[0, 0, 0, 255, 255] } else { &[0, 0, 255, 255] });
     }
@@ -135,8 +135,8 @@ fn filter(row: &[u8], above: Option<&[u8]>, channels: usize, out: &mut [u8]) {
     }
 }
 
-/// The neighbour nearest to left + up − corner, in bytes alone, so that sixteen are worked out side by side: where left and up are on
-/// the same side of the corner, the sum is further from it than from either.
+/// The neighbour nearest to left + up − corner. It is computed in bytes alone, so that sixteen are computed side by side. If left and up
+/// are on the same side of the corner, the sum is further from it than from either.
 #[inline(always)]
 fn paeth(left: u8, up: u8, corner: u8) -> u8 {
     let (to_left, to_up) = (up.abs_diff(corner), left.abs_diff(corner));
@@ -146,7 +146,7 @@ fn paeth(left: u8, up: u8, corner: u8) -> u8 {
     if (to_left <= to_up) & (to_left <= to_corner) { left } else { other }
 }
 
-/// Adler-32 of two runs of bytes, of which the second has `length`, by theirs (zlib's `adler32_combine`).
+/// The Adler-32 of two runs of bytes from the Adler-32 of each; the second run has `length` bytes (zlib's `adler32_combine`).
 fn joined_adler(first: u32, second: u32, length: usize) -> u32 {
     const BASE: u64 = 65521;
     let halves = |sum: u32| (u64::from(sum & 0xffff), u64::from(sum >> 16));

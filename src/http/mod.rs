@@ -32,7 +32,7 @@ use crate::config::Config;
 use crate::error::{Error, Result};
 use crate::job::{Engine, Job};
 use crate::service::Service;
-use crate::study::shelf::Shelf;
+use crate::study::results::Results;
 use idempotency::Idempotency;
 
 /// Uploads at the same time: each may be as large as the limit of a body.
@@ -44,7 +44,7 @@ const LAST_WORDS: Duration = Duration::from_secs(3);
 #[derive(Clone)]
 pub(crate) struct App {
     service: Service,
-    studies: Arc<Shelf>,
+    studies: Arc<Results>,
     request_timeout: Duration,
     streams: Arc<Semaphore>,
     /// Uploads that are held in memory at the same time; the others wait unread.
@@ -117,7 +117,7 @@ impl Server {
         let stop = CancellationToken::new();
         let app = App {
             service: service.clone(),
-            studies: Arc::new(Shelf::new(data_dir.join("studies"))),
+            studies: Arc::new(Results::new(data_dir.join("studies"))),
             request_timeout: Duration::from_millis(config.request_timeout_ms),
             streams: Arc::new(Semaphore::new(config.limits.max_streams)),
             uploads: Arc::new(Semaphore::new(UPLOADS)),

@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::study::CASES;
 use crate::study::planner::Planned;
 use crate::study::record::Record;
-use crate::study::shelf::{PEERS, PLANNER, STABILITY, Shelf};
+use crate::study::results::{PEERS, PLANNER, Results, STABILITY};
 use crate::study::stability::Stability;
 
 const ROOT: &str = "/v1/studies";
@@ -24,13 +24,14 @@ const CHOOSE: &str = "the longest step that is wrong by no more than VTK's pictu
 /// `GET /v1/studies`.
 pub(super) async fn list(State(app): State<App>) -> Result<Json<Value>> {
     let listed = tokio::task::spawn_blocking(move || {
-        let shelf = &app.studies;
-        let peers = shelf.names().into_iter().filter(|name| name.starts_with(PEERS));
+        let results = &app.studies;
+        let peers = results.names().into_iter().filter(|name| name.starts_with(PEERS));
         let cases = CASES.iter().map(|c| (c.name.to_owned(), c.when, c.choose)).chain(peers.map(|name| {
             let when = WHEN[usize::from(name.ends_with("_shaded"))];
             (name, when, CHOOSE)
         }));
-        let cases: Vec<Value> = cases.filter_map(|(name, when, choose)| describe(&name, when, choose, shelf)).collect();
+        let cases: Vec<Value> =
+            cases.filter_map(|(name, when, choose)| describe(&name, when, choose, results)).collect();
         json!({"studies": cases, "stability": app.studies.record(STABILITY).as_ref().map(describe_stability),
             "planner": app.studies.record(PLANNER).as_ref().map(describe_planner)})
     });
@@ -38,8 +39,8 @@ pub(super) async fn list(State(app): State<App>) -> Result<Json<Value>> {
 }
 
 /// A case in short; none that was not measured.
-fn describe(name: &str, when: &str, choose: &str, shelf: &Shelf) -> Option<Value> {
-    let record: Record = shelf.record(name)?;
+fn describe(name: &str, when: &str, choose: &str, results: &Results) -> Option<Value> {
+    let record: Record = results.record(name)?;
     Some(json!({
         "name": record.name, "title": record.title, "when": when, "choose": choose, "truth": record.truth,
         "quick": record.quick, "machine": record.machine, "equal_error": record.equal_error, "equal_time": record.equal_time,

@@ -1,5 +1,5 @@
-//! What is known of this device: by how much a sample of a pixel is cheaper among its neighbours than in a pilot, and what a render costs
-//! besides its samples. Measured once, in less than three seconds, and kept in the data folder.
+//! The calibration of this device: the ratio of a sample's cost among its neighbours to its cost in a pilot, and the cost of a render
+//! besides its samples. It is measured once, in less than three seconds, and kept in the data folder.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -13,28 +13,28 @@ use crate::error::Result;
 use crate::render::region::Region;
 use crate::technique::{self, Kind};
 
-/// Side of the picture, the stride of its pilot, and samples of both.
+/// The side of the picture, the stride of its pilot, and the samples of both.
 const LARGE: u32 = 256;
 const STRIDE: u32 = 4;
 const SAMPLES: u32 = 12;
-/// Pixels of the pilot and of the whole picture, between which is interpolated.
+/// The pixels of the pilot and of the whole picture. Between them the factor is interpolated.
 const PIXELS: [f64; 2] = [((LARGE / STRIDE) * (LARGE / STRIDE)) as f64, (LARGE * LARGE) as f64];
 
 /// Factors of a device.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
-    /// The device with its driver, and this program's version: another is calibrated anew.
+    /// The device with its driver, and this program's version. Another one is calibrated anew.
     of: String,
-    /// By technique: the time of a sample in the large picture over that in the pilot.
+    /// The factors by technique.
     factors: BTreeMap<String, Factors>,
 }
 
-/// Those of one technique.
+/// The factors of one technique.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Factors {
     /// The time of a sample in the whole picture over that in the pilot.
     large_over_pilot: f64,
-    /// What a render costs besides its samples, in samples: previews, and slices that are short until the kernel's speed is known.
+    /// The cost of a render besides its samples, in samples: previews, and slices that are short until the kernel's speed is known.
     besides: f64,
 }
 
@@ -46,19 +46,19 @@ impl Calibration {
             .unwrap_or(Factors { large_over_pilot: 1.0, besides: 0.0 })
     }
 
-    /// What the time of a sample in a pilot is multiplied by, for a picture of so many pixels.
+    /// The ratio of a sample's time in a picture of `pixels` pixels to its time in a pilot.
     pub fn factor(&self, technique: &str, pixels: f64) -> f64 {
         let part = (pixels / PIXELS[0]).ln() / (PIXELS[1] / PIXELS[0]).ln();
         self.of(technique).large_over_pilot.powf(part.clamp(0.0, 1.0))
     }
 
-    /// What a render costs besides its samples, in samples.
+    /// The cost of a render besides its samples, in samples.
     pub fn besides(&self, technique: &str) -> f64 {
         self.of(technique).besides
     }
 }
 
-/// The calibration, once it is needed or asked for.
+/// The calibration, made once it is needed or asked for.
 #[derive(Debug)]
 pub struct Calibrations {
     file: PathBuf,
@@ -66,15 +66,15 @@ pub struct Calibrations {
 }
 
 impl Calibrations {
-    /// Kept in this folder.
+    /// A calibration that is kept in this folder.
     pub fn kept_in(folder: &std::path::Path) -> Self {
         Self { file: folder.join("calibration.json"), known: OnceCell::new() }
     }
 
-    /// The device's, from the file or measured now.
+    /// The device's calibration, from the file or measured now.
     ///
     /// # Errors
-    /// When a render fails.
+    /// The error of a render that fails.
     pub(super) async fn of(&self, planner: &Planner<'_>) -> Result<Calibration> {
         self.known.get_or_try_init(|| self.read_or_measure(planner)).await.cloned()
     }
@@ -95,7 +95,7 @@ impl Calibrations {
         }
         tracing::info!(ms = started.elapsed().as_millis() as u64, "the device is calibrated");
         let found = Calibration { of, factors };
-        // What cannot be kept is measured again next time.
+        // A calibration that cannot be kept is measured again next time.
         if let Err(error) =
             serde_json::to_vec_pretty(&found).map_err(std::io::Error::from).and_then(|t| std::fs::write(&self.file, t))
         {

@@ -1,4 +1,4 @@
-//! The cheapest candidate that is enough, or the best that is in time.
+//! The choice of the cheapest candidate that is enough, or of the best that is in time.
 
 use super::calibration::Calibration;
 use super::field_work::FieldWork;
@@ -7,57 +7,57 @@ use super::pilot::Pilot;
 use super::reply::{Considered, FieldAmount, Predicted};
 use super::target::Target;
 
-/// What a plan aims at, of the error asked for: besides what chance does, estimates are off by a percent.
+/// The part of the error asked for that a plan aims at. Besides chance, estimates are off by a percent.
 pub(super) const AIM: f64 = 0.99;
 /// About nine of ten device times are within this factor of the predicted one.
 const TIME_FACTOR: f64 = 1.5;
-/// And errors.
+/// About nine of ten errors are within this factor of the predicted one.
 const ERROR_FACTOR: f64 = 1.25;
-/// How many ways to split what is asked for between a view and its field are tried.
+/// The number of ways to split the error or the time between a view and its field that are tried.
 const PARTS: u32 = 40;
 
-/// What was chosen.
+/// The chosen setting, with its prediction.
 pub struct Chosen {
     /// The pilot's index.
     pub index: usize,
-    /// How much of it.
+    /// The amount of the setting.
     pub amount: Amount,
     /// True if it is enough for the error asked for.
     pub enough: bool,
-    /// Predicted.
+    /// The predicted device time, ms.
     pub device_ms: Predicted,
-    /// Predicted.
+    /// The predicted error, relative.
     pub error: Predicted,
-    /// Why.
+    /// The reasons in words.
     pub reasons: Vec<String>,
-    /// All of them, in the order of the pilots.
+    /// All settings, in the order of the pilots.
     pub considered: Vec<Considered>,
 }
 
-/// How much of a setting.
+/// The amount of a setting.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Amount {
     /// Samples per pixel.
     pub samples: u32,
-    /// Work of a field, where one is to be computed first.
+    /// The work of a field, if one is to be computed first.
     pub work: Option<FieldAmount>,
 }
 
-/// What is chosen from, and for what.
+/// The candidates of a choice, and its target.
 pub struct Choice<'a> {
     /// The settings.
     pub pilots: &'a [Pilot],
-    /// What the places in a pixel miss.
+    /// The error of the sample places in a pixel.
     pub places: &'a Places,
-    /// What is asked for.
+    /// The error or the time that is asked for.
     pub target: Target,
-    /// The picture's sides.
+    /// The sides of the picture.
     pub image: [u32; 2],
-    /// What is known of the device.
+    /// The calibration of the device.
     pub calibration: &'a Calibration,
     /// The most samples that are permitted.
     pub most: u32,
-    /// The work of a field that is looked at.
+    /// The work of a field, if the scene looks at one.
     pub work: Option<&'a FieldWork>,
 }
 
@@ -68,7 +68,7 @@ impl Choice<'_> {
         let seen = |q: &&Pilot| q.whole.is_some() && q.setting.technique == technique;
         match (p.whole, self.pilots.iter().find(seen)) {
             (Some(whole), _) => whole,
-            // Of another setting of it the whole picture was begun: this one costs as much more there as in its pilot.
+            // The whole picture was begun with another setting of this technique. This setting costs as much more there as in its pilot.
             (None, Some(Pilot { whole: Some(whole), ms_per_sample, .. })) if *ms_per_sample > 0.0 => {
                 whole.map(|ms| ms * p.ms_per_sample / ms_per_sample)
             }
@@ -80,7 +80,7 @@ impl Choice<'_> {
         }
     }
 
-    /// Device time, ms.
+    /// The device time of an amount, ms.
     pub(super) fn cost(&self, p: &Pilot, amount: Amount) -> f64 {
         let [besides, sample] = self.picture_ms(p);
         let field = self.work.zip(amount.work).map_or(0.0, |(work, n)| work.cost(n.amount, besides + sample));
@@ -92,7 +92,7 @@ impl Choice<'_> {
         (p.error_after(f64::from(amount.samples), self.places).powi(2) + of_field).sqrt()
     }
 
-    /// The cheapest amount that is wrong by no more than what is asked for.
+    /// The cheapest amount whose error is at most the one asked for.
     fn for_error(&self, p: &Pilot) -> Option<Amount> {
         let error = AIM * self.target.error;
         let samples = |error: f64| p.samples_for(error, self.places, self.most);
@@ -108,7 +108,7 @@ impl Choice<'_> {
         parts().filter_map(split).min_by(|a, b| self.cost(p, *a).total_cmp(&self.cost(p, *b)))
     }
 
-    /// The best that there is time for, where that is asked for.
+    /// The best amount that there is time for, if a time is asked for.
     fn in_time(&self, p: &Pilot) -> Option<Amount> {
         let [besides, sample] = self.picture_ms(p);
         let samples = |ms: f64| (((ms - besides) / sample).floor().max(1.0) as u32).min(self.most);
@@ -122,7 +122,7 @@ impl Choice<'_> {
         parts().map(split).min_by(|a, b| self.error(p, *a).total_cmp(&self.error(p, *b)))
     }
 
-    /// As near as a setting comes: beside a field's error a view's need not be any smaller.
+    /// The amount at which a setting comes nearest. The view's error need not be any smaller beside its field's.
     fn nearest(&self, p: &Pilot) -> Amount {
         let Some(work) = self.work else { return Amount { samples: self.most, work: None } };
         let n = work.given.unwrap_or(work.most);
@@ -132,7 +132,7 @@ impl Choice<'_> {
         Amount { samples: samples.unwrap_or(self.most), work: Some(work.of(n)) }
     }
 
-    /// Chooses.
+    /// Chooses a setting and its amount.
     pub fn choose(&self) -> Chosen {
         let Self { pilots, target, .. } = *self;
         let for_error: Vec<Option<Amount>> = pilots.iter().map(|p| self.for_error(p)).collect();
@@ -171,12 +171,12 @@ impl Choice<'_> {
     }
 }
 
-/// The setting, and how much of it, that has the least of something.
+/// The setting and its amount with the least value.
 fn least(all: impl Iterator<Item = (usize, Amount, f64)>) -> Option<(usize, Amount)> {
     all.min_by(|a, b| a.2.total_cmp(&b.2)).map(|(i, n, _)| (i, n))
 }
 
-/// Parts of a squared error, or of a time, that a view may have where the rest is its field's.
+/// The tried parts of a squared error, or of a time, that a view may have; the rest is its field's.
 fn parts() -> impl Iterator<Item = f64> {
     (0..=PARTS).map(|i| 0.5 - 0.49 * (std::f64::consts::PI * f64::from(i) / f64::from(PARTS)).cos())
 }
@@ -251,10 +251,10 @@ mod tests {
         let n = error.amount.work.map_or(0, |w| w.amount);
         assert!((195..=215).contains(&error.amount.samples) && (195_000..=215_000).contains(&n), "{:?}", error.amount);
         assert!(error.enough && error.error.value <= 0.099 && error.device_ms.value < 420.0, "{:?}", error.device_ms);
-        // What is left of 205 ms after the pictures on the way, a half each.
+        // The rest of 205 ms after the pictures on the way is split in halves.
         let time = chosen(&pilots, Target { says_error: false, ..target(0.1, Some(205.0)) }, Some(&work));
         assert!((95..=105).contains(&time.amount.samples) && time.device_ms.value <= 205.0, "{:?}", time.amount);
-        // With too few photons no sample helps: of samples there are enough to be small beside them.
+        // With too few photons no sample helps. There are enough samples to be small beside them.
         let given = FieldWork { given: Some(1000), ..work };
         let few = chosen(&pilots, target(0.1, None), Some(&given));
         assert_eq!(

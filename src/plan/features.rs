@@ -1,4 +1,4 @@
-//! What a scene is like, as far as it decides how much model is needed.
+//! The features of a scene that decide the model it needs.
 
 use serde::Serialize;
 
@@ -10,28 +10,28 @@ use crate::technique::PreparedView;
 pub struct Features {
     /// True if every voxel has the same value.
     pub homogeneous: bool,
-    /// The greatest optical depth along each of the volume's axes, of what scatters; none where nothing does.
+    /// The greatest optical depth of the scattering medium along each of the volume's axes; `None` if nothing scatters.
     pub optical_depth: Option<[f64; 3]>,
     /// The greatest part of a collision that is scattered.
     pub albedo: Option<f64>,
-    /// The mean cosine of the angle that a scattering turns light by.
+    /// The mean cosine of the scattering angle.
     pub anisotropy: Option<f64>,
-    /// The part of the light that a slab of the volume's least depth sends back which was scattered more than once: the bound by which multiple
-    /// scattering may be left out.
+    /// The part of the light sent back by a slab of the volume's least depth that was scattered more than once. It is the bound by which
+    /// multiple scattering may be left out.
     pub multiple_scattering: Option<f64>,
-    /// What part each light but a sky has of the light in the middle of the volume, with its place in the request.
+    /// The place in the request of each light but a sky, with its share of the light in the middle of the volume.
     pub light_shares: Vec<(usize, f64)>,
-    /// What a voxel's optical depth changes by where the value goes through its range from one voxel to the next, at the slope of the
-    /// transfer function's steepest part.
+    /// The change of a voxel's optical depth if the value goes through its range from one voxel to the next, at the slope of the transfer
+    /// function's steepest part.
     pub steepest_slope: Option<f64>,
-    /// The part of the pixels that are opaque, where a view ends its rays there.
+    /// The part of the pixels that are opaque, if a view ends its rays there.
     pub opaque: Option<f64>,
-    /// Sides of the smallest voxel over the side of a pixel where the volume's middle is.
+    /// The side of the smallest voxel over the side of a pixel at the volume's middle.
     pub pixels_per_voxel: f64,
 }
 
 impl Features {
-    /// Those of a scene, with its view as that is prepared.
+    /// The features of a scene with its prepared view.
     pub fn of(scene: &Scene, view: &dyn PreparedView) -> Self {
         let optics = view.optics();
         let volume = scene.subject().volume();
@@ -51,7 +51,7 @@ impl Features {
         }
     }
 
-    /// In words, for a reader.
+    /// The features in words, for a reader.
     pub fn words(&self) -> Vec<String> {
         let mut words = Vec::new();
         if self.homogeneous {

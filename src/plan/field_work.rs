@@ -1,10 +1,10 @@
-//! How much work a picture needs of a field that is yet to be computed, such as photons.
+//! The work that a picture needs of a field that is yet to be computed, such as photons.
 //!
-//! A picture I_N after work N is wrong by e² = F² / N, where the work is random. Fields with seeds of their own, some of N and one of 8 N,
-//! tell F²: |I_N − I_8N|² = F² (1/N + 1/8N). Where the picture is not linear in the field, as where its colours follow the field's range, it
-//! is wrong by more, and by what falls faster: F² has that too. The view's own random part is not in it: the square is the mean over the
-//! pixels of d d′, of two seeds of the view. Often it is of a few bright pixels, as those of a beam, or of one number that all colours
-//! follow: one field would tell little.
+//! A picture I_N after work N is wrong by e² = F² / N, if the work is random. Fields with seeds of their own, some of N and one of 8 N,
+//! tell F²: |I_N − I_8N|² = F² (1/N + 1/8N). If the picture is not linear in the field, as with colours that follow the field's range, it
+//! is wrong by more, and that part falls faster; F² has that part too. F² does not have the view's own random part: the square is the mean
+//! over the pixels of d d′, of two seeds of the view. Often only a few bright pixels make it up, as those of a beam, or one number that all
+//! colours follow. One field would then tell little.
 
 use std::sync::Arc;
 
@@ -24,49 +24,49 @@ use crate::render::region::Region;
 use crate::technique::AskedField;
 use crate::volume::Volume;
 
-/// How long the second field is to take, ms.
+/// The device time that a small field is to take, ms.
 const PILOT_MS: f64 = 60.0;
-/// How many of such fields there are, and how many times as much work the last has.
+/// The number of small fields, and the ratio of the large field's work to theirs.
 const FIELDS: usize = 8;
 const MANY: u64 = 8;
-/// Digits of a planned amount of work are kept but for this part of it.
+/// A planned amount of work is rounded to about this part of it.
 const ROUNDED: f64 = 0.01;
-/// Of more pixels than these it does not matter how many there are.
+/// The most degrees of freedom. With more of them their number does not matter.
 const MOST_FREEDOM: f64 = 1e4;
 
-/// A field as pilots see it.
+/// A field as pilots see it: small fields, and a large one.
 pub struct Simulated {
     asked: AskedField,
     most: u64,
-    /// The work of the small ones.
+    /// The work of a small field.
     few: u64,
-    /// The large one, its work, and what that took, ms.
+    /// The large field, its work, and its device time, ms.
     many: Arc<Volume>,
     work: u64,
     ms: f64,
 }
 
-/// What is known of a field's work.
+/// The error and the cost of a field's work.
 #[derive(Debug, Clone, Copy)]
 pub struct FieldWork {
-    /// What is counted.
+    /// The name of the parameter that counts the work.
     pub of: &'static str,
     /// F², relative to the picture's mean, squared.
     pub squared: f64,
-    /// How much more than F² / N says a picture may be wrong by chance.
+    /// The factor by which a picture's error may exceed F / √N by chance.
     pub chance: f64,
-    /// Device time besides the work, and of one piece of it, ms.
+    /// The device time besides the work, and that of one piece of the work, ms.
     pub ms: [f64; 2],
-    /// How much is asked for, where that is said.
+    /// The amount that is asked for, if the request says it.
     pub given: Option<u64>,
-    /// How much is permitted.
+    /// The most work that is permitted.
     pub most: u64,
-    /// Pictures on the way.
+    /// The number of pictures on the way.
     pub looks: u32,
 }
 
 impl Simulated {
-    /// Computes a little of the field that a scene looks at, which tells how much the small fields may have, and the large one.
+    /// Computes a little of the field that a scene looks at, which tells the work of the small fields, and then the large field.
     ///
     /// # Errors
     /// Those of the renders.
@@ -85,7 +85,7 @@ impl Simulated {
         &self.many
     }
 
-    /// Computes the small fields of `scene`, and sees what they do to the picture as the reference shows it.
+    /// Computes the small fields of `scene`, and measures their effect on the picture of the reference.
     ///
     /// # Errors
     /// Those of the renders.
@@ -103,7 +103,7 @@ impl Simulated {
         let [a, b] = last(of_many)?;
         let (mut apart, mut of_fields, mut ms) = (vec![0.0; of_many[0].pixels], Vec::new(), f64::INFINITY);
         for seed in 3..3 + FIELDS as u64 {
-            // One at a time: they may be large.
+            // The fields are computed one at a time, since they may be large.
             let (field, took) = simulate(asked.planner, scene, [self.few, seed]).await?;
             let looking = Asked { scene: &looking_at(scene, &field)?, ..asked };
             let [c, d] = last(&looking.run_two(&pilot.setting, region, SAMPLES).await?)?;
@@ -114,7 +114,7 @@ impl Simulated {
         }
         let per_piece = 1.0 / self.few as f64 + 1.0 / self.work as f64;
         let squared = mean(apart.iter().copied()).max(0.0) / pilot.scale.powi(2) / per_piece;
-        // Pixels of one voxel are one.
+        // The pixels of one voxel count as one.
         let alike = (pixels_per_voxel / f64::from(region.stride)).max(1.0).powi(2);
         Ok(FieldWork {
             of: self.asked.work.of,
@@ -127,27 +127,27 @@ impl Simulated {
         })
     }
 
-    /// What the device takes besides the work and for one piece of it, where the small fields take so long.
+    /// The device time besides the work and that of one piece of it, if a small field takes `few_ms`.
     fn line(&self, few_ms: f64) -> [f64; 2] {
         let each = self.ms / self.work as f64;
-        // What few pieces take as long for as many is not their own time.
+        // Time that does not grow with the number of pieces is not their own.
         let one = ((self.ms - few_ms) / (self.work - self.few).max(1) as f64).clamp(0.5 * each, each);
         [self.ms - one * self.work as f64, one]
     }
 
-    /// Puts so much work into a request.
+    /// Puts an amount of work into a request.
     pub fn put_into(&self, request: &mut Value, work: u64) {
         request["volume"][self.asked.technique][self.asked.work.of] = json!(work);
     }
 }
 
-/// What two runs came to.
+/// The last rounds of two runs.
 fn last([a, b]: &[Run; 2]) -> Result<[Arc<Round>; 2]> {
     let rounds = a.rounds().last().cloned().zip(b.rounds().last().cloned());
     rounds.map(Into::into).ok_or_else(|| Error::internal("a pilot without rounds"))
 }
 
-/// The field of a scene after so much work, by a seed of its own, and its time on the device, ms.
+/// The field of a scene after an amount of work, by a seed of its own, and its time on the device, ms.
 async fn simulate(planner: &Planner<'_>, scene: &Scene, [work, seed]: [u64; 2]) -> Result<(Arc<Volume>, f64)> {
     let Some(asked) = scene.subject().field() else { return Err(Error::internal("there is no field")) };
     let region = Region::some(1.0, [0, 0], scene.image());
@@ -159,17 +159,17 @@ async fn simulate(planner: &Planner<'_>, scene: &Scene, [work, seed]: [u64; 2]) 
 }
 
 impl FieldWork {
-    /// So much of it.
+    /// An amount of this work.
     pub fn of(&self, amount: u64) -> FieldAmount {
         FieldAmount { of: self.of, amount }
     }
 
-    /// The square of what it brings after so much, with as much as may be by chance.
+    /// The squared error that the field brings after an amount of work, times the square of `by_chance`.
     pub fn squared_after(&self, amount: u64, by_chance: f64) -> f64 {
         by_chance * by_chance * self.squared / amount as f64
     }
 
-    /// The least that is wrong by no more than `room`, squared; none where that is more than is permitted, or than is asked for.
+    /// The least work whose squared error is at most `room`; `None` if it is more than is permitted, or than is asked for.
     pub fn needed(&self, room: f64) -> Option<u64> {
         let least = (self.squared_after(1, self.chance) / room).max(1.0);
         match self.given {
@@ -178,39 +178,39 @@ impl FieldWork {
         }
     }
 
-    /// How much there is time for, besides what any amount takes.
+    /// The amount of work that there is time for, besides the time of any amount.
     pub fn in_time(&self, ms: f64) -> u64 {
         self.given.unwrap_or(((ms / self.ms[1]) as u64).clamp(1, self.most))
     }
 
-    /// What it costs, with the pictures on the way.
+    /// The device time of an amount of work, with the pictures on the way, ms.
     pub fn cost(&self, amount: u64, picture_ms: f64) -> f64 {
         self.ms[0] + self.ms[1] * amount as f64 + f64::from(self.looks) * picture_ms
     }
 }
 
-/// Of how many pixels a sum of squares is, (Σ s)² / Σ s², where the square of one that is known by so many fields is too large by 1 + 2/k.
+/// The effective number of pixels of a sum of squares, (Σ s)² / Σ s². The square of one that is known by k fields is too large by 1 + 2/k.
 fn independent(squares: &[f64]) -> f64 {
     let (sum, of_squares) = squares.iter().fold((0.0, 0.0), |(sum, of_squares), s| (sum + s, of_squares + s * s));
     if of_squares > 0.0 { sum * sum / of_squares * (1.0 + 2.0 / FIELDS as f64) } else { 1.0 }
 }
 
-/// How free sums of squares are that vary so from one to the next: ν = 2 m² / s².
+/// The degrees of freedom of sums of squares, from their variation: ν = 2 m² / s².
 fn freedom(sums: &[f64]) -> f64 {
     let m = mean(sums.iter().copied());
     let variance = sums.iter().map(|s| (s - m).powi(2)).sum::<f64>() / (sums.len() - 1) as f64;
     2.0 * m * m / variance
 }
 
-/// What a picture may be wrong by over what pictures of all fields are, in 19 of 20: the square is a ratio of sums of ν squares and of
-/// k ν, and that has Fisher's distribution.
+/// The factor by which a picture's error may exceed that of the pictures of all fields, in 19 of 20 cases. The square is a ratio of sums of
+/// ν squares and of k ν, and that has Fisher's distribution.
 fn by_chance(freedom: f64) -> f64 {
     let freedom = if freedom.is_finite() { freedom.clamp(1.0, MOST_FREEDOM) } else { MOST_FREEDOM };
     let ratio = FisherSnedecor::new(freedom, FIELDS as f64 * freedom);
     ratio.map_or(1.0, |ratio| ratio.inverse_cdf(0.95)).sqrt()
 }
 
-/// With few digits, and no less.
+/// Rounds an amount up to few digits.
 fn rounded_up(amount: f64) -> u64 {
     let digit = 10f64.powf((ROUNDED * amount).log10().floor()).max(1.0);
     ((amount / digit).ceil() * digit) as u64

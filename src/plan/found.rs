@@ -1,4 +1,4 @@
-//! What the pilots found, and a closer look at it where it may decide.
+//! The findings of the pilots, and a closer look at them if it may decide.
 
 use super::noise::{Places, SMALL, in_common, random};
 use super::pilot::{PIXELS, Pilot, SAMPLES, chance, deviation, lasting};
@@ -8,45 +8,48 @@ use crate::error::{Error, Result};
 use crate::render::region::Region;
 use crate::technique::Setting;
 
-/// Samples of a deeper look, of those that are likely to be planned, and of those of the one before.
+/// The samples of a deeper look, as multiples: of those that are likely to be planned, and at most of those of the look before.
 const DEEPER: [u32; 2] = [8, 16];
-/// Samples of the whole picture with the chosen setting that confirm it, and where one takes long.
+/// The samples of the whole picture with the chosen setting that confirm it, and the samples if one takes long.
 const CONFIRMED: [u32; 2] = [4, 2];
-/// A sample that takes longer, ms, takes long; a picture of which one takes less is timed once more.
+/// A sample that takes longer than this, ms, takes long. A picture whose first sample takes less is timed once more.
 const SHORT: f64 = 20.0;
-/// Of fewer pixels that matter a pilot does not tell what the places miss in the picture,
+/// With fewer pixels that matter than this, a pilot does not tell the error of the places in the picture.
 const FEW: f64 = 200.0;
-/// nor where the first samples of the whole picture miss so many times as much, squared, or so many times less,
+/// A pilot does not tell it either if the first samples of the whole picture have an error of the places, squared, that is larger or
+/// smaller by this factor.
 const UNLIKE: f64 = 1.5;
-/// which must be seen by so many deviations, and matter.
+/// The number of deviations by which that error must exceed chance, besides being large enough to matter.
 const SURE: f64 = 4.0;
-/// What part of that a closer look must have, and what part of the picture it may.
+/// The least part of that error that a closer look must cover, and the largest part of the picture that it may cover.
 const PART: f64 = 0.9;
 const MOST: f64 = 0.25;
 
-/// What the pilots found.
+/// The findings of the pilots.
 #[derive(Default)]
 pub struct Found {
-    /// Of those that were run, the reference first.
+    /// The pilots that were run, the reference first.
     pub pilots: Vec<Pilot>,
     /// The reference's runs, by two seeds.
     pub reference: Option<[Run; 2]>,
-    /// What the places in a pixel miss, of all of them.
+    /// The error of the places in a pixel, from all looks.
     pub places: Places,
-    /// The same as the reference's pilot saw it, which is of all of the picture.
+    /// The error of the places as the reference's pilot saw it, over the whole picture.
     pub everywhere: Places,
     /// The part of the reference's pixels that are opaque.
     pub opaque: f64,
-    /// Pixels of the reference's pilot that matter.
+    /// The number of pixels of the reference's pilot that matter.
     pub matter: f64,
-    /// Where in the picture what the places miss is, if that is a small part of it, and what a mean of squares there is in the picture.
+    /// The region of most of the places' error, if that is a small part of the picture, and the factor from a mean of squares there to one
+    /// over the picture.
     pub part: Option<(Region, f64)>,
-    /// Those that were not run, as one that leaves out less leaves out too much.
+    /// The settings that were not run, since one that leaves out less leaves out too much.
     pub skipped: Vec<Considered>,
 }
 
 impl Found {
-    /// Runs a pilot of each setting; the first setting is the reference. One that leaves out more than one that leaves out too much for `most` is not run.
+    /// Runs a pilot of each setting; the first setting is the reference. A setting is not run if it leaves out more than one that leaves
+    /// out too much for `most`.
     ///
     /// # Errors
     /// Those of the requests.
@@ -85,7 +88,7 @@ impl Found {
             found.pilots.push(Pilot {
                 setting: setting.clone(),
                 random,
-                // There are more pixels in the picture, of the same kinds.
+                // The picture has more pixels, of the same kinds.
                 chance: chance(seen * f64::from(region.stride).powi(2), seen * a.len() as f64),
                 bias,
                 bias_within,
@@ -98,7 +101,7 @@ impl Found {
         if found.pilots.is_empty() { Err(Error::internal("no setting is possible")) } else { Ok(found) }
     }
 
-    /// What the places miss in the part of the picture where that is.
+    /// The error of the places in the region that has most of it.
     async fn look_at_part(&self, asked: Asked<'_>, setting: &Setting, samples: u32, scale: f64) -> Result<Places> {
         let Some((region, part)) = self.part else { return Ok(self.places.clone()) };
         let [a, b] = asked.run_two(setting, region, samples).await?;
@@ -108,7 +111,7 @@ impl Found {
         Ok(places.at_least(&self.everywhere))
     }
 
-    /// Looks at what the places miss after `samples` of a pilot that are likely to be planned, unless that is known.
+    /// Measures the error of the places after `samples` of a pilot's setting that are likely to be planned, unless that is known.
     ///
     /// # Errors
     /// Those of the request.
@@ -129,8 +132,8 @@ impl Found {
         Ok(true)
     }
 
-    /// The first samples of the whole picture, with the setting that is likely to be chosen, unless they are there: its time, and its
-    /// random part, of which a pilot may have seen more or less than there is, the others alike.
+    /// Runs the first samples of the whole picture with the setting that is likely to be chosen, unless they are there. They tell its time
+    /// and its random part. A pilot may have seen more or less of the random part than there is, and so may the others.
     ///
     /// # Errors
     /// Those of the request.
@@ -155,11 +158,11 @@ impl Found {
         Ok(true)
     }
 
-    /// Where few pixels matter, as those around a lamp that is seen, a pilot has too few of them or none: the first samples of the whole
-    /// picture tell how much the places miss and where that is.
+    /// Looks closer if few pixels matter, as those around a lamp that is seen. A pilot has too few of them or none. The first samples of
+    /// the whole picture tell the error of the places and its region.
     async fn look_closer(&mut self, asked: Asked<'_>, setting: &Setting, seen: &WholePicture) -> Result<()> {
         let by_chance = seen.random / f64::from(asked.image()[0]).sqrt() / f64::from(asked.image()[1]).sqrt();
-        // A pilot that has all of the pixels has seen it.
+        // A pilot that has all of the pixels has seen the error.
         let all = Region::some(PIXELS, [0, 0], asked.image()).stride == 1;
         if all || self.part.is_some() || seen.missed <= (SURE * by_chance).max(SMALL * seen.random) {
             return Ok(());
@@ -178,18 +181,18 @@ impl Found {
     }
 }
 
-/// What the first samples of a whole picture tell, by two seeds.
+/// The findings of the first samples of a whole picture, by two seeds.
 struct WholePicture {
     samples: u32,
     /// The mean luminance.
     scale: f64,
-    /// J² of `noise`, relative, and the pixels that it is of.
+    /// J² of `noise`, relative, and the effective number of its pixels.
     random: f64,
     matter: f64,
-    /// What the first sample and the last differ by that is not random, squared, relative; what that might be off by.
+    /// The squared difference of the first sample and the last less its random part, relative, and its relative deviation.
     missed: f64,
     within: f64,
-    /// Where most of that is, as `around` has it.
+    /// The region of most of that difference, from `around`.
     around: Option<(Region, f64)>,
 }
 
@@ -214,7 +217,7 @@ impl WholePicture {
     }
 }
 
-/// The rectangle around most of what is missed, and the part of it that it has; none where that is not a small part of the picture.
+/// The rectangle around most of the missed squares, and the part of them inside; `None` if that is not a small part of the picture.
 fn around(missed: &[f64], [width, height]: [u32; 2]) -> Option<(Region, f64)> {
     let total: f64 = missed.iter().sum();
     let mut order: Vec<usize> = (0..missed.len()).collect();

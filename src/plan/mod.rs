@@ -1,13 +1,13 @@
 //! The planner: model no more than a scene needs.
 //!
-//! A request says what is looked at and how wrong the picture may be or how long it may take. From the scene's [`features`] come the
-//! `settings` that could do, less those that a bound rules out; a `pilot` of a few thousand pixels of the picture itself measures what each
-//! of the rest costs here and is wrong by; what was `found` is looked at closer where that might be the best, and the likely one is
-//! confirmed on the whole picture; `choose` takes the cheapest that is enough, or the best that is in time, and says why in `words`. Of a
-//! field that is yet to be computed some small ones stand for it, and tell how much of its `field_work` its picture needs.
+//! A request gives a scene and the error that the picture may have or the time that it may take. The scene's [`features`] give the
+//! `settings` that could do, less those that a bound rules out. A `pilot` of a few thousand pixels of the picture itself measures the cost
+//! and the error of each of the rest here. The planner looks closer at what was `found` if that might be the best, and confirms the likely
+//! setting on the whole picture. `choose` takes the cheapest setting that is enough, or the best that is in time, and gives the reasons in
+//! `words`. For a field that is yet to be computed, some small fields stand in. They tell the `field_work` that its picture needs.
 //!
-//! What grows how is what the study measured: random `noise` falls as the root of the samples, what the places in a pixel miss by a power
-//! between ½ and 1 and not everywhere; time is linear in samples and pixels.
+//! The laws of growth are those that the study measured. Random `noise` falls as the root of the samples. The error of the places in a
+//! pixel falls by a power between ½ and 1, and not everywhere. Time is linear in samples and pixels.
 
 mod calibration;
 mod choose;
@@ -42,18 +42,18 @@ pub use reply::{Considered, FieldAmount, Plan, Predicted};
 use run::Asked;
 use target::Target;
 
-/// How often one plan looks deeper or at the whole picture, at most.
+/// The most times that one plan looks deeper or at the whole picture.
 const LOOKS: usize = 12;
-/// Of fewer samples than these the film knows its noise less well than a pilot.
+/// With fewer samples than these, the film knows its noise less well than a pilot.
 const FEW: u32 = 8;
-/// How wide the voxels of a coarser level may be on the picture, pixels.
+/// The greatest width of the voxels of a coarser level in the picture, pixels.
 const WIDEST_PIXELS: f64 = 2.0;
 
-/// What is looked at.
+/// The scene of a request, as the planner sees it.
 struct Seen {
     /// The scene as it was asked for.
     asked: Scene,
-    /// The same, looking at a volume that is there.
+    /// The scene as it looks at a volume that is there.
     scene: Scene,
     view: Arc<dyn PreparedView>,
     simulated: Option<Simulated>,
@@ -61,20 +61,20 @@ struct Seen {
     open: bool,
 }
 
-/// What planning needs.
+/// The planner, with the engine and the data that it needs.
 pub struct Planner<'a> {
-    /// Runs the pilots.
+    /// The engine that runs the pilots.
     pub engine: &'a Engine,
-    /// What is stored.
+    /// The stored assets.
     pub assets: &'a Assets,
-    /// What is permitted.
+    /// The limits of requests.
     pub limits: &'a Limits,
-    /// What is known of this device.
+    /// The calibration of this device.
     pub calibrations: &'a Calibrations,
 }
 
 impl Planner<'_> {
-    /// Plans a request whose technique is `auto`, or a view of which only what is not given is planned.
+    /// Plans a request whose technique is `auto`. Of a view it plans only the parameters that are not given.
     ///
     /// # Errors
     /// Those of the request.
@@ -82,7 +82,7 @@ impl Planner<'_> {
         if !body.is_object() {
             return Err(Error::invalid("", "not an object", "a JSON object such as a render's"));
         }
-        // One for all of its pilots.
+        // All of its pilots share one place.
         let _place = self.engine.reserve()?;
         let mut seen = self.see(body).await?;
         let target = Target::of(&seen.scene);
@@ -90,7 +90,7 @@ impl Planner<'_> {
         let Settings { all, ruled_out } = seen.settings(target.error);
         let skipped = |(setting, bound, why)| Considered { bias: Some(bound), ..Considered::skipped(&setting, why) };
         let mut considered: Vec<Considered> = ruled_out.into_iter().map(skipped).collect();
-        // What is wrong by too much is of no use, unless all that there is time for is.
+        // A setting that is wrong by too much is of no use, unless a time is asked for.
         let useless = if target.time_ms.is_none() { target.error } else { f64::INFINITY };
         let mut found = Found::of(asked, &all, useless).await?;
         seen.features.opaque = seen.features.optical_depth.is_none().then_some(found.opaque);
@@ -122,7 +122,7 @@ impl Planner<'_> {
         })
     }
 
-    /// Chooses, and looks closer where that might change what is chosen, until it does not.
+    /// Chooses, and looks closer as long as that might change the choice.
     async fn choose(
         &self,
         asked: Asked<'_>,
@@ -149,7 +149,7 @@ impl Planner<'_> {
         Ok(choose(found))
     }
 
-    /// What a request looks at, as the planner sees it: of a field that is yet to be computed a simulation of little work.
+    /// The scene of a request, as the planner sees it. A field that is yet to be computed becomes a simulation of little work.
     async fn see(&self, body: &Value) -> Result<Seen> {
         let technique = technique_of(body);
         let mut with_technique = body.clone();
@@ -172,15 +172,15 @@ impl Planner<'_> {
         Ok(Seen { asked, scene, view, simulated, features, open: body["technique"] == AUTO })
     }
 
-    /// Measures what is to be known of this device, unless that is known.
+    /// Calibrates this device, unless it is calibrated.
     ///
     /// # Errors
-    /// When a render fails.
+    /// The error of a render that fails.
     pub async fn calibrate(&self) -> Result<()> {
         self.calibrations.of(self).await.map(drop)
     }
 
-    /// Every setting that could be chosen, whatever a bound says of it, in words and as a request; the first is the reference.
+    /// Every setting that could be chosen, whatever a bound says of it, in words and as a request. The first is the reference.
     ///
     /// # Errors
     /// Those of the request.
@@ -189,7 +189,7 @@ impl Planner<'_> {
         Ok(settings.all.iter().map(|s| (s.words.clone(), reply::request(body, s))).collect())
     }
 
-    /// The request to render, and what the planner says of it: of another technique than `auto` the request as it is.
+    /// The request to render, and the planner's words about it. A request of another technique than `auto` stays as it is.
     ///
     /// # Errors
     /// As [`Planner::plan`].
@@ -213,7 +213,7 @@ impl Planner<'_> {
 }
 
 impl Seen {
-    /// The settings that could do, the reference first; those that do not go together with the scene are left out.
+    /// The settings that could do, the reference first. Those that do not go together with the scene are left out.
     fn settings(&self, error: f64) -> Settings {
         let name = self.scene.technique().name;
         let as_given =
@@ -232,13 +232,13 @@ impl Seen {
     }
 }
 
-/// The scene with this in place of its field. It may take a while.
+/// The scene with this volume in place of its field. It may take a while.
 fn looking_at(scene: &Scene, volume: &Arc<Volume>) -> Result<Scene> {
     tokio::task::block_in_place(|| scene.looking_at(scene.subject().with_volume(volume.clone())))
 }
 
-/// The technique that a request is planned as. Where it names none, that is the complete technique of what it says of the scene, or the first
-/// of the list.
+/// The technique that a request is planned as. If it names none, that is the complete technique of the request's sections about the scene,
+/// or the first of the list.
 fn technique_of(body: &Value) -> &'static Technique {
     let complete = |t: &Technique| technique::find(t.complete());
     let shares = |t: &&Technique| t.shares.iter().any(|section| body.get(section).is_some());
@@ -248,8 +248,9 @@ fn technique_of(body: &Value) -> &'static Technique {
     named.or_else(sharing).or_else(given).unwrap_or(&technique::ALL[0])
 }
 
-/// A plan's samples are enough by what the pilots know; where the film finds that it is so sooner, the render stops. A stepping view that
-/// finds its step too long starts over with a shorter one, which the plan knows better.
+/// The budget of a planned request. The samples are enough by the findings of the pilots; if the film finds so sooner, the render stops. A
+/// stepping view gets no error, since it would start over with a shorter step if it found its step too long. The plan knows the step
+/// better.
 fn budget(best: &Pilot, scene: &Scene, amount: &choose::Amount, enough: bool, target: Target) -> Value {
     let room = (choose::AIM * target.error).powi(2) - (best.bias + best.bias_within).powi(2);
     let mut budget = json!({"samples": amount.samples});

@@ -1,8 +1,8 @@
-//! What more samples take away, in two parts that fall differently: e_n² = P_n² + J² / n.
+//! The noise, in two parts that fall differently with more samples: e_n² = P_n² + J² / n.
 //!
-//! P_n is what the places in a pixel miss, of edges above all: the same for every seed and, as long as the picture is much the same, for
-//! every setting. J² is the variance that random numbers bring into a sample, along its path or in where its steps begin: a seed of its own
-//! has another.
+//! P_n is the error of the sample places in a pixel, at edges above all. It is the same for every seed and, as long as the picture is much
+//! the same, for every setting. J² is the variance that random numbers bring into a sample, along its path or at the start of its steps.
+//! Every seed has another random part.
 
 use std::sync::Arc;
 
@@ -11,36 +11,39 @@ use crate::film::Round;
 
 /// A part of the variance that is too small to look at more closely.
 pub const SMALL: f64 = 0.1;
-/// How much more random than another setting one may be, in variance, for its look at the places to be good enough for that one.
+/// The greatest ratio, in variance, of the random part of the setting that looked at the places to that of another setting, so that the
+/// look is good enough for the other one.
 const AS_GOOD: f64 = 4.0;
-/// Rounds of which the whole picture has some.
+/// The number of first rounds that the whole picture may have too.
 const FIRST: usize = 4;
 
-/// What is known of P after so many samples.
+/// The error P after some samples, as it was measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Known {
     samples: u32,
     /// P², relative.
     squared: f64,
-    /// J² of the setting that was looked at, which blurs it.
+    /// J² of the setting that was looked at, which blurs P².
     random: f64,
 }
 
-/// P, by the numbers of samples that were looked at.
+/// The error P, by the numbers of samples that were looked at.
 #[derive(Debug, Clone, Default)]
 pub struct Places {
     known: Vec<Known>,
-    /// The squares of what these samples and the first differ by, in which there is nothing random.
+    /// The squares of the differences between these samples and the first, without a random part.
     steps: Vec<(u32, f64)>,
-    /// How much more there is of P² in the picture than in the pilots, and what it might be larger by: these have few of its edges.
+    /// The ratio of P² in the picture to that in the pilots, and the relative amount by which it might be larger. Pilots have few of the
+    /// picture's edges.
     more: f64,
     within: f64,
-    /// True if more samples than were looked at are taken to be as good as they could be: what might be the best is looked at.
+    /// True if more samples than were looked at are taken to be as good as they could be. A setting that might be the best is then looked
+    /// at.
     pub hopeful: bool,
 }
 
 impl Places {
-    /// By two renders of the first setting with seeds of their own, relative to `scale`: the mean of (Iₙ − I_N) (I′ₙ − I′_N) in which
+    /// P from two renders of the first setting with seeds of their own, relative to `scale`: the mean of (Iₙ − I_N) (I′ₙ − I′_N), in which
     /// their random parts average to nothing. `within` is the relative deviation of such squares.
     pub fn by_two(a: &[Arc<Round>], b: &[Arc<Round>], scale: f64, within: f64) -> Self {
         let (Some(last), Some(other)) = (a.last(), b.last()) else { return Self::default() };
@@ -56,7 +59,7 @@ impl Places {
         Self { known: known.collect(), steps: steps.collect(), more: 1.0, within, hopeful: true }
     }
 
-    /// No less than what another look found after as many samples.
+    /// Raises each P² to that of another look after as many samples, if that is larger.
     pub fn at_least(mut self, other: &Self) -> Self {
         for known in &mut self.known {
             let seen = other.known.iter().find(|k| k.samples == known.samples);
@@ -65,7 +68,7 @@ impl Places {
         self
     }
 
-    /// By more samples of one setting of which J² is known: |Iₙ − I_N|² = P² + J² (1/n − 1/N).
+    /// Adds P² from more samples of one setting of which J² is known: |Iₙ − I_N|² = P² + J² (1/n − 1/N).
     pub fn look_deeper(&mut self, rounds: &[Arc<Round>], scale: f64, random: f64) {
         let Some(last) = rounds.last() else { return };
         let seen: Vec<Known> = rounds
@@ -85,31 +88,32 @@ impl Places {
         self.known.sort_by_key(|k| k.samples);
     }
 
-    /// What the first sample of the whole picture and the first few miss, over what they do in the pilots.
+    /// The ratio of `squared`, the squared difference between the first sample of the whole picture and the first few, to that of the
+    /// pilots.
     pub fn more_by(&self, samples: u32, squared: f64) -> f64 {
         let pilots = self.steps.iter().find(|s| s.0 == samples).map_or(0.0, |s| s.1);
         if pilots > 0.0 { squared / pilots } else { f64::INFINITY }
     }
 
-    /// That there is `more` times as much of P² in the picture as in the pilots, give or take `within`.
+    /// Sets the ratio of P² in the picture to that in the pilots to `more`, which may be larger by the part `within`.
     pub fn scale(&mut self, more: f64, within: f64) {
         (self.more, self.within) = (more, within);
     }
 
-    /// The most samples that were looked at.
+    /// The largest number of samples that was looked at.
     pub fn last(&self) -> u32 {
         self.known.last().map_or(1, |k| k.samples)
     }
 
-    /// P² after `samples`, relative. It need not fall everywhere: places in the middle or balanced around it are better than a few more.
-    /// So between two numbers that were looked at it is taken to be twice the larger, and as one place more or less weighs, as the second
-    /// did: where it matters no such number is planned. Beyond them it falls no faster than evenly spread places can, nor more slowly than
-    /// random ones.
+    /// P² after `samples`, relative. It need not fall everywhere: places in the middle or balanced around it are better than a few more. So
+    /// between two numbers that were looked at it is taken to be twice the larger, plus the weight of one place more or less, from the
+    /// second sample. If P matters, no such number is planned. Beyond them it falls no faster than with evenly spread places, and no more
+    /// slowly than with random ones.
     pub fn squared_after(&self, samples: f64) -> f64 {
         self.squared(samples, if self.hopeful { 2 } else { 1 })
     }
 
-    /// The same, beyond what was looked at falling by this power.
+    /// P² after `samples`. Beyond the numbers that were looked at it falls by this power.
     fn squared(&self, samples: f64, power: i32) -> f64 {
         let Some(last) = self.known.last() else { return 0.0 };
         let beyond = f64::from(last.samples) / samples;
@@ -139,20 +143,21 @@ impl Places {
     }
 }
 
-/// P² by what the picture differs by from that of more samples, which are no truth: as random ones would, with |Iₙ − I_N|² = P² (1 − n/N).
+/// P² from the squared difference to the picture of more samples. These are no truth, so the difference is taken to be as with random
+/// samples, |Iₙ − I_N|² = P² (1 − n/N).
 fn apart(few: &Round, more: &Round, squared: f64) -> f64 {
     squared.max(0.0) / (1.0 - f64::from(few.samples) / f64::from(more.samples))
 }
 
-/// What two pictures differ by times what those of another seed do, of every pixel: (Iₙ − I_N) (I′ₙ − I′_N).
+/// The difference of two pictures times that of two pictures of another seed, of every pixel: (Iₙ − I_N) (I′ₙ − I′_N).
 pub fn in_common<'a>(a: [&'a Round; 2], b: [&'a Round; 2]) -> impl Iterator<Item = f64> + 'a {
     let apart = |[few, more]: [&Round; 2], i: usize| f64::from(few.luminance[i]) - f64::from(more.luminance[i]);
     let products = (0..a[0].luminance.len()).map(move |i| apart(a, i) * apart(b, i));
     products.map(|p| if p.is_finite() { p } else { 0.0 })
 }
 
-/// J², relative, by what two seeds differ by from round to round, half of the variance of that; and of how many pixels it is:
-/// ν = (Σ Jᵢ²)² / Σ Jᵢ⁴, where the square of a Jᵢ² that is known by k rounds is too large by 1 + 2/k.
+/// J², relative, as half of the variance of the differences of two seeds from round to round; and the effective number of its pixels, ν =
+/// (Σ Jᵢ²)² / Σ Jᵢ⁴. The square of a Jᵢ² that is known by k rounds is too large by 1 + 2/k.
 pub fn random(a: &[Arc<Round>], b: &[Arc<Round>], scale: f64) -> (f64, f64) {
     let pixels = a.first().map_or(0, |r| r.luminance.len());
     let rounds = a.len().min(b.len()).max(1) as f64;
@@ -192,12 +197,12 @@ pub mod tests {
 
     const PIXELS: usize = 4096;
 
-    /// What the places of this test miss in a pixel after n samples.
+    /// The error of this test's places in a pixel after n samples.
     fn missed(samples: u32, pixel: usize) -> f64 {
         0.8 * (pixel as f64 * 2.399).sin() / f64::from(samples)
     }
 
-    /// A picture of 1 with random numbers of that deviation, where the places miss something.
+    /// A picture of 1 with random numbers of that deviation, and with an error of the places.
     fn rounds(seed: u32, deviation: f64, most: u32) -> Vec<Arc<Round>> {
         let (mut random, mut sums) = (noise(seed), vec![0.0f64; PIXELS]);
         let of = |samples: u32| {
@@ -217,7 +222,7 @@ pub mod tests {
         assert!((pixels / PIXELS as f64 - 1.0).abs() < 0.1, "{pixels}: all of them alike");
         let mut places = Places::by_two(&a[..5], &b[..5], 1.0, 0.0);
         places.hopeful = false;
-        // 0.8² / 2 / n², and what of it the last has in common.
+        // The first is 0.8² / 2 / n²; the rest is the part that the last picture has in common.
         let expected = |n: f64, last: f64| 0.32 * (1.0 / n - 1.0 / last).powi(2) / (1.0 - n / last);
         for n in [1.0, 2.0, 4.0] {
             let got = places.squared_after(n);

@@ -1,44 +1,45 @@
-//! A few thousand pixels of the picture itself with each candidate: what it costs on this device, and what it is wrong by.
+//! Pilots: a few thousand pixels of the picture itself with each candidate. They tell its cost on this device, and its error.
 //!
-//! What is left out is the mean over the pixels of d₁ d₂, where d is the difference to the reference with seeds of their own: noise of the
-//! two is independent and averages to nothing, and places in a pixel are the same for both. What more samples take away is in `noise`.
+//! The squared bias is the mean over the pixels of d₁ d₂, where d is the difference to the reference with seeds of their own. The noise of
+//! the two is independent and averages to nothing, and the places in a pixel are the same for both. The part of the error that more samples
+//! take away is in `noise`.
 
 use super::noise::Places;
 use super::run::mean;
 use crate::technique::Setting;
 
-/// Pixels of a pilot, about.
+/// The approximate number of pixels of a pilot.
 pub const PIXELS: f64 = 4096.0;
-/// Samples of a pilot.
+/// The samples of a pilot.
 pub const SAMPLES: u32 = 16;
-/// Deviations that one in twenty is beyond, on one side.
+/// The deviations that one value in twenty is beyond, on one side.
 const ONE_IN_TWENTY: f64 = 1.645;
-/// Groups of pixels of which the spread tells how well a bias is known.
+/// The number of groups of pixels. Their spread tells the deviation of a bias.
 const GROUPS: usize = 16;
 
-/// What a pilot found.
+/// The findings of a pilot.
 #[derive(Clone)]
 pub struct Pilot {
-    /// Of what.
+    /// The setting of the pilot.
     pub setting: Setting,
     /// J² of `noise`, relative: the variance that random numbers bring into a sample.
     pub random: f64,
-    /// How much more than its random part a picture may be wrong by chance.
+    /// The factor by which the random part of a picture's error may be larger by chance.
     pub chance: f64,
-    /// What more samples do not take away, relative,
+    /// The bias, relative. More samples do not take it away.
     pub bias: f64,
-    /// and how much larger it might be.
+    /// The amount by which the bias might be larger.
     pub bias_within: f64,
-    /// The mean luminance that it is relative to.
+    /// The mean luminance that these are relative to.
     pub scale: f64,
-    /// Device time of a sample of a pixel, ms.
+    /// The device time of a sample of a pixel, ms.
     pub ms_per_sample: f64,
-    /// Once the whole picture was begun: what it costs besides its samples and what a sample of it costs, ms.
+    /// The cost of the whole picture besides its samples and the cost of one sample of it, ms, once the picture was begun.
     pub whole: Option<[f64; 2]>,
 }
 
 impl Pilot {
-    /// The square of the noise after `samples`, with as much of the random part as `by_chance`.
+    /// The square of the noise after `samples`, with the random part of the error times `by_chance`.
     pub fn squared_after(&self, samples: f64, places: &Places, by_chance: f64) -> f64 {
         places.squared_after(samples) + by_chance * by_chance * self.random / samples
     }
@@ -48,11 +49,11 @@ impl Pilot {
         (self.squared_after(samples, places, 1.0) + self.bias * self.bias).sqrt()
     }
 
-    /// The fewest samples after which the error is at most `error`; none where the bias is in the way.
+    /// The fewest samples after which the error is at most `error`; `None` if the bias or the limit of samples is in the way.
     pub fn samples_for(&self, error: f64, places: &Places, most: u32) -> Option<u32> {
         let room = error * error - (self.bias + self.bias_within).powi(2);
         let enough = |n: u32| self.squared_after(f64::from(n), places, self.chance) <= room;
-        // What was looked at need not fall everywhere; beyond it, it does.
+        // The error need not fall everywhere among the numbers that were looked at; beyond them, it does.
         let last = places.last().min(most);
         let looked_at = (1..=last).find(|n| room > 0.0 && enough(*n));
         looked_at.or_else(|| {
@@ -73,15 +74,15 @@ pub fn deviation(pixels: f64) -> f64 {
     (2.0 / pixels.max(1.0)).sqrt()
 }
 
-/// What the random part of a picture may be wrong by over its deviation, in 19 of 20: its square has a relative variance of 2/ν, where ν
-/// are the `pixels` that matter, and so has what is known of it, by so many numbers of them.
+/// The factor by which the random part of a picture's error may exceed its deviation, in 19 of 20 cases. Its square has a relative variance
+/// of 2/ν, where ν is the number of `pixels` that matter. The estimate of it has such a variance too, with ν = `numbers`.
 pub fn chance(pixels: f64, numbers: f64) -> f64 {
     let variance = 2.0 / pixels.max(1.0) + 2.0 / numbers.max(1.0);
     (1.0 + ONE_IN_TWENTY * variance.sqrt()).sqrt()
 }
 
-/// The root of the mean of the products d₁ d₂ of the pixels, and how much more it might be: two deviations, by the spread over groups of
-/// pixels.
+/// The root of the mean of the products d₁ d₂ of the pixels, and the amount by which it might be larger: two deviations, by the spread over
+/// groups of pixels.
 pub fn lasting(products: Vec<f64>) -> (f64, f64) {
     let count = GROUPS.min(products.len());
     let groups: Vec<f64> = (0..count).map(|g| mean(products.iter().skip(g).step_by(count).copied())).collect();

@@ -1,4 +1,4 @@
-//! What a planner says, and the request that carries its plan out.
+//! The planner's reply, and the request that carries its plan out.
 
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
@@ -17,12 +17,12 @@ pub struct Predicted {
     pub interval: [f64; 2],
 }
 
-/// So much of a field's work, under the name of the parameter that says how much.
+/// An amount of a field's work, under the name of its parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FieldAmount {
     /// The parameter.
     pub of: &'static str,
-    /// How much.
+    /// The amount of the work.
     pub amount: u64,
 }
 
@@ -37,24 +37,24 @@ impl Serialize for FieldAmount {
 /// A setting that was considered.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Considered {
-    /// What it is, in words.
+    /// The setting in words.
     pub words: String,
     /// Its technique.
     pub technique: String,
-    /// Samples per pixel that it would take for the error asked for, or could take in the time.
+    /// The samples per pixel that it would take for the error asked for, or could take in the time.
     pub samples: Option<u32>,
-    /// And how much work of the field, where one is computed first.
+    /// The work of the field, if one is computed first.
     #[serde(flatten)]
     pub work: Option<FieldAmount>,
-    /// What it would take, device milliseconds.
+    /// The device time that it would take, milliseconds.
     pub device_ms: Option<f64>,
-    /// What it would be wrong by, relative.
+    /// The error that it would have, relative.
     pub error: Option<f64>,
-    /// What it is wrong by however many samples it takes.
+    /// The error that it has however many samples it takes.
     pub bias: Option<f64>,
     /// True if it is enough.
     pub enough: bool,
-    /// Why it is, or is not.
+    /// The reason that it is enough, or is not.
     pub why: String,
 }
 
@@ -84,25 +84,25 @@ pub struct Plan {
     pub options: Value,
     /// Samples per pixel.
     pub samples: u32,
-    /// How much work of the field, where one is computed first.
+    /// The work of the field, if one is computed first.
     #[serde(flatten)]
     pub work: Option<FieldAmount>,
-    /// Time on the device, ms.
+    /// The time on the device, ms.
     pub device_ms: Predicted,
     /// The error, relative.
     pub error: Predicted,
-    /// Why, in words.
+    /// The reasons in words.
     pub reasons: Vec<String>,
     /// Every setting that was considered.
     pub considered: Vec<Considered>,
-    /// What the scene is like.
+    /// The features of the scene.
     pub features: Features,
     /// The request to post: this plan carried out.
     pub request: Value,
 }
 
-/// The parameters of a setting's technique in a request: those that the request gives, and what the setting changes. A request that leaves the
-/// technique open may give those of any technique that shows the same scene.
+/// The parameters of a setting's technique in a request: those that the request gives, with the changes of the setting. A request that
+/// leaves the technique open may give those of any technique that shows the same scene.
 pub(super) fn options(body: &Value, setting: &Setting) -> Map<String, Value> {
     let of = technique::find(setting.technique).map(|t| t.complete());
     let alike = |t: &&technique::Technique| body["technique"] == t.name || (is_open(body) && Some(t.complete()) == of);

@@ -1,4 +1,4 @@
-//! A render of the planner's: unseen, of some of the picture's pixels, with what each had come to on the way.
+//! A render for the planner: unseen, of some of the picture's pixels, with the rounds of each.
 
 use std::sync::Arc;
 
@@ -10,26 +10,26 @@ use crate::render::Scene;
 use crate::render::region::Region;
 use crate::technique::Setting;
 
-/// From this alpha on a pixel counts as opaque.
+/// The alpha from which on a pixel counts as opaque.
 const OPAQUE: f32 = 0.99;
 
 /// A finished pilot render.
 pub struct Run {
-    /// What it gathered.
+    /// The film that it gathered.
     pub film: Arc<Film>,
-    /// Pixels.
+    /// The number of pixels.
     pub pixels: usize,
-    /// Device time besides the samples, and of a sample, ms.
+    /// The device time besides the samples, and that of a sample, ms.
     pub ms: [f64; 2],
 }
 
 impl Run {
-    /// What the picture was on the way.
+    /// The rounds of the picture.
     pub fn rounds(&self) -> &[Arc<Round>] {
         &self.film.rounds
     }
 
-    /// Of a pixel, linear.
+    /// The linear luminance of a pixel.
     pub fn luminance(&self, pixel: usize) -> f64 {
         self.film.main.luminance(pixel)
     }
@@ -48,7 +48,7 @@ impl Run {
 /// The scene that is planned, for the runs of its pilots.
 #[derive(Clone, Copy)]
 pub struct Asked<'a> {
-    /// Runs them.
+    /// The planner that runs them.
     pub planner: &'a Planner<'a>,
     /// The scene as it was asked for, looking at a volume that is there.
     pub scene: &'a Scene,
@@ -95,10 +95,10 @@ pub async fn finish(planner: &Planner<'_>, pilot: Scene) -> Result<Run> {
     Ok(Run { pixels: film.main.pixels(), ms: [(first.device_ms - sample).max(0.0), sample], film })
 }
 
-/// Runs a pilot to its end, unseen; where that is not waited for any more, it is cancelled.
+/// Runs a pilot to its end, unseen. If nobody waits for it any more, it is cancelled.
 ///
 /// # Errors
-/// [`Error::Kernel`] where its kernel does not build, [`Error::Internal`] where it fails otherwise.
+/// [`Error::Kernel`] if its kernel does not build, [`Error::Internal`] if it fails otherwise.
 pub async fn to_its_end(planner: &Planner<'_>, pilot: Scene) -> Result<Arc<Job>> {
     let guard = CancelOnDrop::new(planner.engine, planner.engine.submit_pilot(pilot));
     let job = guard.job();
@@ -112,7 +112,7 @@ pub async fn to_its_end(planner: &Planner<'_>, pilot: Scene) -> Result<Arc<Job>>
     }
 }
 
-/// 0 of nothing.
+/// The mean of the values; 0 for none.
 pub fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, n) = values.fold((0.0, 0.0), |(sum, n), v| (sum + v, n + 1.0));
     if n > 0.0 { sum / n } else { 0.0 }

@@ -1,11 +1,11 @@
-//! What is asked for: an error, a time, or both.
+//! The target of a plan: an error, a time, or both.
 
 use crate::render::Scene;
 
-/// The error where the budget is silent.
+/// The error if the budget gives none.
 const USUAL_ERROR: f64 = 0.02;
 
-/// What is asked for.
+/// The target of a plan.
 #[derive(Debug, Clone, Copy)]
 pub struct Target {
     /// The error, relative.
@@ -17,7 +17,7 @@ pub struct Target {
 }
 
 impl Target {
-    /// That of a scene's budget.
+    /// The target of a scene's budget.
     pub fn of(scene: &Scene) -> Self {
         let budget = scene.budget();
         Self {

@@ -1,11 +1,12 @@
-//! What is said of a choice.
+//! The words about a choice.
 
 use super::choose::{AIM, Amount, Choice};
 use super::pilot::Pilot;
 use super::reply::{Considered, FieldAmount};
 
 impl Choice<'_> {
-    /// `needed` is what the error asked for takes, or what fits into the time where only that was asked for, and its time.
+    /// A considered setting with its reason. `needed` is the amount for the error asked for, or the amount that fits into the time if only
+    /// that was asked for, and its time.
     pub(super) fn considered(&self, p: &Pilot, needed: Option<(Amount, f64)>) -> Considered {
         let (bias, target) = (p.bias + p.bias_within, self.target);
         let late = |ms: f64| target.time_ms.filter(|t| target.says_error && ms > *t);

@@ -1,10 +1,10 @@
-//! The box that a scene's subject fills, with the grid that it is looked at through.
+//! The box around a scene's subject, with the grid through which it is seen.
 
 use glam::{DAffine3, DMat3, DVec3};
 
 use crate::volume::Volume;
 
-/// A box in the world and the cells that it has along its axes: a volume's voxels. A box of no volume is one cell.
+/// A box in the world and its number of cells along each axis. A volume's cells are its voxels; a box without a volume has one cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
     /// World from index: the box is `[0, dims]` in index units.
@@ -15,7 +15,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// A box given by its transform and cells; `scan` when its world axes are a patient's.
+    /// A box given by its transform and cells; `scan` is true if its world axes are a patient's.
     pub fn new(world_from_index: DAffine3, dims: [usize; 3], scan: bool) -> Self {
         Self { world_from_index, dims, scan }
     }
@@ -26,23 +26,23 @@ impl Bounds {
         Self::new(world_from_index, [1; 3], false)
     }
 
-    /// World from index units.
+    /// The transform from index units to the world.
     pub fn world_from_index(&self) -> DAffine3 {
         self.world_from_index
     }
 
-    /// Cells along its axes.
+    /// The number of cells along each axis.
     pub fn dims(&self) -> [usize; 3] {
         self.dims
     }
 
-    /// Sides of a cell, world units.
+    /// The sides of a cell, world units.
     pub fn spacing(&self) -> [f64; 3] {
         let linear = self.world_from_index.matrix3;
         [linear.x_axis.length(), linear.y_axis.length(), linear.z_axis.length()]
     }
 
-    /// The smallest of them.
+    /// The smallest side of a cell, world units.
     pub fn smallest_side(&self) -> f64 {
         self.spacing().into_iter().fold(f64::INFINITY, f64::min)
     }
@@ -62,12 +62,13 @@ impl Bounds {
         std::array::from_fn(corner)
     }
 
-    /// Which way is up: z for a scan, y for what has no patient.
+    /// The up direction: z for a scan, y for a subject without a patient.
     pub fn up(&self) -> DVec3 {
         if self.scan { DVec3::Z } else { DVec3::Y }
     }
 
-    /// From the centre to the eye: a patient's face a little from the side and above; a built-in from where the chamber is open.
+    /// The direction from the centre to the eye. It shows a patient's face a little from the side and above, and a built-in from the open
+    /// side of the chamber.
     pub fn direction(&self) -> DVec3 {
         if self.scan { DVec3::new(-0.55, 1.0, 0.3).normalize() } else { DVec3::new(0.45, 0.32, -1.0).normalize() }
     }

@@ -1,4 +1,4 @@
-//! The camera: validated, in double precision, and what the device is told of it.
+//! The camera: validated, in double precision, with the view that the device gets of it.
 
 use glam::{DMat3, DMat4, DVec3};
 
@@ -8,9 +8,9 @@ use crate::error::{Error, Result};
 use crate::request::CameraRequest;
 use crate::volume::Volume;
 
-/// Vertical angle of view when none is given: the contract's 53.13 degrees, twice the angle whose tangent is a half.
+/// The vertical angle of view if none is given: the contract's 53.13 degrees, twice the angle whose tangent is a half.
 const DEFAULT_FOV_Y_DEG: f64 = 53.13;
-/// How far a rotation's columns may be from orthonormal: what survives a client's single-precision matrix.
+/// The greatest deviation of a rotation's columns from orthonormal. A client's single-precision matrix is within it.
 const RIGID_TOLERANCE: f64 = 1e-3;
 
 /// A valid camera. Directions are unit vectors in world space.
@@ -35,7 +35,7 @@ fn finite(v: [f64; 3], at: &str) -> Result<DVec3> {
 }
 
 impl Camera {
-    /// A camera from a request, framing the box where the request is silent.
+    /// A camera from a request. It frames the box in the fields that the request leaves out.
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the field under `/camera`.
@@ -115,23 +115,22 @@ impl Camera {
         })
     }
 
-    /// Unit vector from the scene towards the eye: where a headlight shines from.
+    /// The unit vector from the scene towards the eye, from which a headlight shines.
     pub fn towards_eye(&self) -> DVec3 {
         -self.forward
     }
 
-    /// Height of what the picture shows where the volume's middle is, world units.
+    /// The height of the visible section at the distance of the target, world units.
     pub fn height_at_target(&self) -> f64 {
         2.0 * (self.target - self.eye).length() * (0.5 * self.fov_y_deg.to_radians()).tan()
     }
 
-    /// What the device is told for an image of `size` pixels of what is in a box: the plane near the box and its pixels, worked out
-    /// in double precision so that a far eye costs no digits; its first pixel is the one at `left`, `top`. The fields of the pass are left at
-    /// zero.
+    /// The device's view of an image of `size` pixels of a box: the plane near the box and its pixels. It is computed in double precision,
+    /// so that a far eye costs no digits. Its first pixel is the one at `left`, `top`. The fields of the pass are left at zero.
     pub(crate) fn device_view(&self, size: [u32; 2], [left, top]: [u32; 2], bounds: &Bounds) -> View {
         let index_from_world = bounds.world_from_index().inverse();
         let radius = bounds.radius();
-        // The plane through the box's centre; an eye inside or behind gets one just ahead of it instead.
+        // The plane goes through the box's centre; an eye inside or behind gets one just ahead of it instead.
         let ahead = (-self.eye.dot(self.forward)).max(0.1 * radius);
         let reach = if self.perspective { ahead } else { (self.target - self.eye).length() };
         let pixel = 2.0 * reach * (0.5 * self.fov_y_deg.to_radians()).tan() / f64::from(size[1]);
@@ -173,8 +172,8 @@ fn isotropic_squared(bounds: &Bounds) -> f32 {
     if even { side as f32 } else { 0.0 }
 }
 
-/// [`View::flat_squared`] of a volume: what rounding alone may make of a gradient, squared, where values are interpolated to about 2^-15
-/// of their range.
+/// [`View::flat_squared`] of a volume: the squared gradient that rounding alone may cause, if values are interpolated to about 2^-15 of
+/// their range.
 pub(crate) fn flat_squared(volume: &Volume) -> f32 {
     let [low, high] = volume.range();
     let voxel = volume.smallest_side();
@@ -200,8 +199,8 @@ mod tests {
                     part.plane,
                     whole.plane
                 );
-                let turned = if perspective { moved } else { 0.0 };
-                assert!((part.towards[axis] - whole.towards[axis] - turned).abs() < 1e-4, "{:?}", part.towards);
+                let rotated = if perspective { moved } else { 0.0 };
+                assert!((part.towards[axis] - whole.towards[axis] - rotated).abs() < 1e-4, "{:?}", part.towards);
             }
         }
         Ok(())

@@ -41,13 +41,13 @@ impl Clip {
         Ok(Self { planes })
     }
 
-    /// True if nothing of what is in the box is left: all its corners are on the wrong side of one plane.
+    /// True if the planes remove the whole box: all its corners are on the wrong side of one plane.
     pub fn removes_all(&self, bounds: &Bounds) -> bool {
         let corners = bounds.corners();
         self.planes.iter().any(|(n, d)| corners.iter().all(|corner| n.dot(*corner) + d <= 0.0))
     }
 
-    /// Tells the device, in index units.
+    /// Writes the planes into the device's view, in index units.
     pub fn apply(&self, bounds: &Bounds, view: &mut View) {
         let world_from_index = bounds.world_from_index();
         view.planes = self.planes.len().min(PLANES) as i32;

@@ -1,12 +1,12 @@
-//! How much of something a straight line through a volume meets: what decides how much model a scene needs.
+//! The amount of a density along straight lines through a volume. It decides the model that a scene needs.
 
 use crate::volume::Volume;
 
-/// Lines a side of a face that are looked along.
+/// The most lines along a side of a face.
 const LINES: usize = 32;
 
-/// The greatest integral of `density` (of a value) along lines parallel to each of the volume's own axes, in world units: of up to
-/// `LINES`² lines each, spread evenly over the face. What is not finite counts as empty.
+/// The greatest integral of `density` (of a value) along lines parallel to each of the volume's own axes, in world units. Each axis has up
+/// to `LINES`² lines, spread evenly over the face. Values that are not finite count as empty.
 pub fn greatest_along_axes(volume: &Volume, density: impl Fn(f64) -> f64) -> [f64; 3] {
     let (dims, spacing) = (volume.dims(), volume.spacing());
     std::array::from_fn(|axis| {

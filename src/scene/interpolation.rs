@@ -1,4 +1,4 @@
-//! How values lie between voxels.
+//! The interpolation of values between voxels.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -18,7 +18,7 @@ pub enum Interpolation {
 }
 
 impl Interpolation {
-    /// The kernels' `INTERPOLATION`.
+    /// The value of the kernels' `INTERPOLATION`.
     pub const fn code(self) -> i32 {
         match self {
             Self::Nearest => 0,

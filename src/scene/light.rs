@@ -1,4 +1,4 @@
-//! Lights from infinity and how a surface takes them: shared by every view that shades a gradient (`kernels/shared/shade.h`).
+//! Lights from infinity and the shading of surfaces. Every view that shades a gradient shares them (`kernels/shared/shade.h`).
 
 use glam::DVec3;
 use schemars::JsonSchema;
@@ -77,12 +77,12 @@ impl Default for LightRequest {
 }
 
 impl LightRequest {
-    /// A headlight under a bright sky: for a view that shadows the ambient part.
+    /// A headlight under a bright sky, for a view that shadows the ambient part.
     pub fn diffuse_sky() -> Self {
         Self { ambient: 0.6, diffuse: 0.4, specular: 0.15, ..Self::default() }
     }
 
-    /// What a schema cannot say: directions have a length, and there is one way to give them.
+    /// Checks the rules that a schema cannot express: directions have a length, and there is one way to give them.
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the field under `at`.
@@ -111,7 +111,7 @@ impl LightRequest {
         self.lights.clone().unwrap_or_else(|| vec![Directional { direction: self.direction, color: white() }])
     }
 
-    /// Tells the device.
+    /// Writes the lights into the device's view.
     pub fn apply(&self, camera: &Camera, view: &mut View) {
         let lights = self.lights();
         view.lights = lights.len().min(LIGHTS) as i32;

@@ -7,11 +7,11 @@ use serde::Deserialize;
 use super::medium::Spectrum;
 use crate::error::{Error, Result};
 
-/// Floats of a light in the kernel's table: `LIGHT_NUMBERS` of `kernels/shared/light.h`.
+/// The number of floats of a light in the kernel's table: `LIGHT_NUMBERS` of `kernels/shared/light.h`.
 pub const LIGHT_NUMBERS: usize = 16;
 /// The most lights of a scene.
 const MOST_LIGHTS: usize = 8;
-/// Radiances, irradiances and intensities are at most this.
+/// The greatest permitted radiance, irradiance or intensity.
 const BRIGHTEST: f64 = 1e9;
 
 /// A light. Which of the fields count is said by `type`. Lights do not hide anything.
@@ -58,14 +58,14 @@ pub struct LightSource {
     edge_v: Option<[f64; 3]>,
 }
 
-/// The sky in numbers.
+/// The sky's radiances, its up direction and its visibility.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sky {
-    /// Radiance at the zenith, the horizon and straight below.
+    /// The radiance at the zenith, the horizon and straight below.
     pub radiance: [[f64; 3]; 3],
-    /// Which way is up, where the request says so.
+    /// The up direction, if the request gives one.
     pub up: Option<DVec3>,
-    /// True if the eye sees it.
+    /// True if the eye sees the sky.
     pub visible: bool,
 }
 
@@ -113,7 +113,7 @@ impl LightSource {
         ]
     }
 
-    /// What a light of its type has to have, and what it may have.
+    /// The fields that a light of its type must have, and the fields that it may have.
     fn fields(&self) -> [&'static [&'static str]; 2] {
         match self.kind.as_str() {
             "sun" => [&[], &["direction", "irradiance", "angular_diameter_deg"]],
@@ -185,7 +185,7 @@ impl LightSource {
         given.map_or([otherwise; 3], Spectrum::rgb)
     }
 
-    /// Where it is, or towards it.
+    /// The light's position, or for a sun the direction towards it.
     fn place(&self, up: DVec3) -> DVec3 {
         let otherwise = if up == DVec3::Z { DVec3::new(0.6, 0.6, 0.8) } else { DVec3::new(0.7, 0.9, -0.4) };
         match self.kind.as_str() {
@@ -200,7 +200,7 @@ impl LightSource {
         of(self.position) + of(self.corner) + 0.5 * (of(self.edge_u) + of(self.edge_v))
     }
 
-    /// About how much of its light falls on a face in the middle of a volume of that radius.
+    /// The approximate irradiance from this light on a face in the middle of a volume of that radius.
     fn irradiance_at_middle(&self, radius: f64) -> f64 {
         let squared = self.middle().length_squared().max(0.25 * radius * radius);
         let brightness = luminance(self.color());
@@ -215,7 +215,7 @@ impl LightSource {
         }
     }
 
-    /// 1 − the cosine of a sun's angular radius, or a sphere's radius.
+    /// The size: for a sun 1 − the cosine of its angular radius, else a sphere's radius.
     fn size(&self) -> f64 {
         match self.kind.as_str() {
             "sun" => {
@@ -251,17 +251,17 @@ impl Lights {
         self.0.iter().filter(|l| l.kind != "sky")
     }
 
-    /// How many there are besides the sky.
+    /// The number of lights besides the sky.
     pub fn count(&self) -> usize {
         self.aimed_at().count()
     }
 
-    /// True if a ray may meet one: it has a size.
+    /// True if a ray may meet a light, since one of them has a size.
     pub fn any_with_size(&self) -> bool {
         self.aimed_at().any(|l| l.kind != "point" && (l.kind != "sun" || l.size() > 0.0))
     }
 
-    /// The first that no ray meets by chance.
+    /// The index of the first light that no ray meets by chance.
     pub fn first_without_size(&self) -> Option<usize> {
         self.0.iter().position(|l| l.kind == "point" || (l.kind == "sun" && l.size() == 0.0))
     }
@@ -280,8 +280,8 @@ impl Lights {
         })
     }
 
-    /// What part each light has of all that falls on a face in the middle of a volume of that radius, in the order of the request; none of
-    /// a sky, whose light comes from everywhere.
+    /// The share of each light in the irradiance on a face in the middle of a volume of that radius, in the order of the request. A sky has
+    /// no share, since its light comes from everywhere.
     pub fn shares(&self, radius: f64) -> Vec<Option<f64>> {
         let sky = self.sky().map_or(0.0, |s| s.radiance.into_iter().map(luminance).sum::<f64>() / 3.0);
         let falls = |l: &LightSource| (l.kind != "sky").then(|| l.irradiance_at_middle(radius));
@@ -290,8 +290,8 @@ impl Lights {
         all.into_iter().map(|share| share.map(|s| if total > 0.0 { s / total } else { 0.0 })).collect()
     }
 
-    /// The kernel's table of all but the sky. A light is chosen the more often the more of it there is in the middle of a volume of that
-    /// radius, and a fifth of the time whatever there is.
+    /// The kernel's table of all lights but the sky. A light's probability of being chosen follows its irradiance in the middle of a volume
+    /// of that radius; a fifth of the probability is spread evenly over the lights.
     pub fn table(&self, radius: f64, up: DVec3) -> Vec<f32> {
         let shares: Vec<f64> = self.aimed_at().map(|l| l.irradiance_at_middle(radius)).collect();
         let (total, n) = (shares.iter().sum::<f64>(), shares.len() as f64);

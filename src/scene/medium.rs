@@ -1,4 +1,4 @@
-//! What a volume is made of, for views that scatter light: its values are densities.
+//! The medium of a volume, for views that scatter light. The volume's values are densities.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -18,7 +18,7 @@ pub enum Spectrum {
 }
 
 impl Spectrum {
-    /// Red, green, blue.
+    /// The spectrum as red, green, blue.
     pub fn rgb(self) -> [f64; 3] {
         match self {
             Self::Grey(v) => [v; 3],
@@ -26,7 +26,7 @@ impl Spectrum {
         }
     }
 
-    /// Checks that all of it is between `least` and `most`, which a schema of two forms would say in too many words.
+    /// Checks that all numbers are between `least` and `most`. A schema of two forms would say this in too many words.
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the field `at`.
@@ -76,11 +76,11 @@ impl Default for MediumRequest {
     }
 }
 
-/// The optical depth from side to side that stands for a medium without `sigma_t_per_unit`.
+/// The optical depth from side to side of a medium without `sigma_t_per_unit`.
 const DEFAULT_DEPTH: f64 = 40.0;
 
 impl MediumRequest {
-    /// Checks what the schema cannot say.
+    /// Checks the rules that the schema cannot express.
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the field under `at`.
@@ -112,7 +112,7 @@ impl MediumRequest {
         }
     }
 
-    /// density = value · first + second, and no more than third.
+    /// The three numbers of the density: density = value · first + second, and no more than third.
     pub fn density(&self) -> [f64; 3] {
         match self.density_window {
             Some([low, high]) => [1.0 / (high - low), -low / (high - low), 1.0],
@@ -126,12 +126,12 @@ impl MediumRequest {
         (value * scale + offset).min(most).max(0.0)
     }
 
-    /// The greatest density anywhere.
+    /// The greatest density in the volume.
     pub fn greatest_density(&self, volume: &Volume) -> f64 {
         volume.range().into_iter().map(|v| self.density_of(v)).fold(0.0, f64::max)
     }
 
-    /// Extinction per world unit at a density of 1, by colour.
+    /// The extinction per world unit at a density of 1, by colour.
     pub fn sigma_t_per_unit(&self, volume: &Volume) -> [f64; 3] {
         let greatest = self.greatest_density(volume);
         let otherwise = DEFAULT_DEPTH / (super::mean_side(volume) * if greatest > 0.0 { greatest } else { 1.0 });

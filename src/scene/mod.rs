@@ -1,5 +1,5 @@
-//! The parts of a scene: camera, clipping planes, transfer function, window, medium, lights. Each is made from its wire type and is valid
-//! from then on.
+//! The parts of a scene: camera, clipping planes, transfer function, window, medium, lights. Each part is made from its wire type and is
+//! valid from then on.
 
 pub mod bounds;
 pub mod camera;

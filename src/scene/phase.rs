@@ -1,4 +1,4 @@
-//! Phase functions: how a collision turns light.
+//! Phase functions: the distribution of the scattering angle.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -43,7 +43,7 @@ impl Default for Phase {
 }
 
 impl Phase {
-    /// The mean cosine of the angle that light is turned by; none where that depends on an energy.
+    /// The mean cosine of the scattering angle; `None` if it depends on an energy.
     pub fn mean_cosine(&self) -> Option<f64> {
         match (self.kind.as_str(), &self.cosines, &self.densities) {
             ("henyey_greenstein", ..) => Some(self.g),
@@ -54,7 +54,7 @@ impl Phase {
         }
     }
 
-    /// Checks what the schema cannot say.
+    /// Checks the rules that the schema cannot express.
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the field under `at`.
@@ -79,7 +79,7 @@ impl Phase {
         Ok(())
     }
 
-    /// The kernel's kind and its three parameters. Rows of a tabulated one are put behind `rows`, which starts at `rows_at` in
+    /// The kernel's kind and its three parameters. The rows of a tabulated function are appended to `rows`, which starts at `rows_at` in
     /// the kernel's table.
     pub fn numbers(&self, rows: &mut Vec<f32>, rows_at: usize) -> [f32; 4] {
         match self.kind.as_str() {
@@ -95,7 +95,7 @@ impl Phase {
         }
     }
 
-    /// Rows of cosine, normalised density and cumulative probability.
+    /// Appends rows of cosine, normalised density and cumulative probability, and returns their number.
     fn tabulate(&self, rows: &mut Vec<f32>) -> usize {
         let (Some(cosines), Some(densities)) = (&self.cosines, &self.densities) else { return 0 };
         let area = |i: usize| 0.5 * (densities[i] + densities[i - 1]) * (cosines[i] - cosines[i - 1]);

@@ -2,7 +2,7 @@
 
 use super::transfer_request::ControlPoint;
 
-/// sRGB's decoding (IEC 61966-2-1), for colours that are chosen by eye.
+/// The decoding of sRGB (IEC 61966-2-1), for colours that are chosen by eye.
 pub fn linear(srgb: f64) -> f64 {
     if srgb <= 0.04045 { srgb / 12.92 } else { ((srgb + 0.055) / 1.055).powf(2.4) }
 }
@@ -35,7 +35,7 @@ const CT_BONE: PresetPoints = &[
     (0.75, 0xf4ead2, 3.0),
     (1.0, 0xffffff, 6.0),
 ];
-/// The same in Hounsfield units: bone starts at about 200, dense bone at 700.
+/// Bone of a CT in Hounsfield units: bone starts at about 200, dense bone at 700.
 const CT_BONE_HOUNSFIELD: PresetPoints = &[
     (-1000.0, 0x000000, 0.0),
     (120.0, 0x6a2a1c, 0.0),
@@ -44,7 +44,7 @@ const CT_BONE_HOUNSFIELD: PresetPoints = &[
     (1000.0, 0xf6eedc, 4.0),
     (2000.0, 0xffffff, 6.0),
 ];
-/// Bone in flesh by two classes: flesh hardly there, bone nearly opaque.
+/// Bone in flesh by two classes: flesh is nearly transparent, bone nearly opaque.
 const BONE_FLESH: PresetPoints = &[
     (0.0, 0x000000, 0.0),
     (0.18, 0xc07860, 0.0),
@@ -53,7 +53,7 @@ const BONE_FLESH: PresetPoints = &[
     (0.46, 0xf6eedc, 5.0),
     (1.0, 0xffffff, 8.0),
 ];
-/// The same in Hounsfield units.
+/// Bone in flesh, in Hounsfield units.
 const BONE_FLESH_HOUNSFIELD: PresetPoints = &[
     (-1000.0, 0x000000, 0.0),
     (-200.0, 0xc07860, 0.0),
@@ -62,7 +62,7 @@ const BONE_FLESH_HOUNSFIELD: PresetPoints = &[
     (250.0, 0xf6eedc, 5.0),
     (2000.0, 0xffffff, 8.0),
 ];
-/// Two classes by colour: the lower blue and transparent, the upper yellow and opaque.
+/// Two classes by colour: the lower is blue and transparent, the upper yellow and opaque.
 const BLUE_YELLOW: PresetPoints = &[
     (0.0, 0x2040ff, 0.0),
     (0.12, 0x2040ff, 0.0),
@@ -92,13 +92,14 @@ pub fn points(name: &str, range: [f64; 2], full: f64) -> Vec<ControlPoint> {
     table.iter().map(|&(f, rgb, opacity)| by_eye(low + (high - low) * f, rgb, opacity * full)).collect()
 }
 
-/// A look for each label up to `most`: 0 is empty, the others have hues a golden section of a turn apart, so that neighbours differ.
+/// A colour and an opacity for each label up to `most`. Label 0 is empty; the hues of the others are a golden section of the colour circle
+/// apart, so that neighbours differ.
 pub fn labels(most: f64, full: f64) -> Vec<([f64; 3], f64)> {
     let count = most.clamp(0.0, 4095.0) as u32;
     (0..=count).map(|label| (label_color(label), if label == 0 { 0.0 } else { full })).collect()
 }
 
-/// The colour of a label that is given none.
+/// The default colour of a label.
 pub fn label_color(label: u32) -> [f64; 3] {
     let pure = hue((f64::from(label) * 0.618_033_988_749_895).fract());
     pure.map(|c| 0.08 + 0.82 * c)
@@ -117,9 +118,9 @@ const CUDA_SAMPLE: [[f64; 4]; 9] = [
     [0.0, 0.0, 0.0, 0.0],
 ];
 
-/// That sample's transfer function over values of `range` as 0 to 1: its table is looked up at (v − offset) · scale with a
-/// linear filter between texel centres, its alpha is times `density` and stands for a step of 0.01 in a box from −1 to 1, of
-/// which `unit` is half a side in world units.
+/// The transfer function of CUDA's sample over values of `range` as 0 to 1. Its table is looked up at (v − offset) · scale with a linear
+/// filter between texel centres. Its alpha is multiplied by `density` and stands for a step of 0.01 in a box from −1 to 1; `unit` is half a side
+/// of that box in world units.
 pub fn cuda_sample(density: f64, [offset, scale]: [f64; 2], range: [f64; 2], unit: f64) -> Vec<ControlPoint> {
     const PARTS: usize = 8;
     let look = |place: f64| {
@@ -138,7 +139,7 @@ pub fn cuda_sample(density: f64, [offset, scale]: [f64; 2], range: [f64; 2], uni
     (0..=8 * PARTS).map(point).collect()
 }
 
-/// HLS(turn 360, 0.5, 1) as linear RGB: lightness a half and saturation 1 are the pure hues.
+/// HLS(turn 360, 0.5, 1) as linear RGB. A lightness of a half and a saturation of 1 give the pure hues.
 pub fn hue(turn: f64) -> [f64; 3] {
     let channel = |shift: f64| {
         let t = (turn + shift).rem_euclid(1.0) * 6.0;

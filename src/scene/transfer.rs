@@ -5,9 +5,9 @@ pub use super::transfer_request::{ControlPoint, Label, TransferRequest};
 use crate::error::{Error, Result, Violation};
 use crate::volume::Volume;
 
-/// Entries of the table that the device reads. `TABLE_SIZE` in `kernels/shared/optical.h`.
+/// The number of entries of the table that the device reads: `TABLE_SIZE` in `kernels/shared/optical.h`.
 pub const TABLE_SIZE: usize = 4096;
-/// The optical depth that a preset's opacity 1 has across the volume's mean side: nearly opaque, still soft.
+/// The optical depth of a preset's opacity 1 across the volume's mean side: nearly opaque, still soft.
 const PRESET_OPTICAL_DEPTH: f64 = 24.0;
 
 /// A valid transfer function for one volume.
@@ -17,20 +17,21 @@ pub enum TransferFunction {
     Points(Vec<ControlPoint>),
     /// The lecture's (C, alpha) = HLS((v / vmax + rotation) 360, 0.5, 1), pow(v / vmax, exponent).
     Hls {
-        /// Turns of hue added.
+        /// The rotation of the hue, in turns.
         rotation: f64,
         /// Exponent of the opacity.
         exponent: f64,
-        /// The value of hue turn 1 and full opacity.
+        /// The value with a hue of one full turn and full opacity.
         value_max: f64,
         /// Opacity per world unit at full opacity.
         opacity_per_unit: f64,
     },
-    /// A colour and an opacity per world unit for each whole number from 0; nothing for others.
+    /// A colour and an opacity per world unit for each whole number from 0; other values are empty.
     Labels(Vec<([f64; 3], f64)>),
 }
 
-/// The values that a preset spans. A field's brightest voxels stand next to its source and would leave the rest dark.
+/// The range of a preset's values. A field's brightest voxels are next to its source and would leave the rest dark, so its default range
+/// excludes them.
 fn span(wish: Option<[f64; 2]>, volume: &Volume, at: &str) -> Result<[f64; 2]> {
     match wish {
         Some([low, high]) if high > low => Ok([low, high]),
@@ -42,7 +43,7 @@ fn span(wish: Option<[f64; 2]>, volume: &Volume, at: &str) -> Result<[f64; 2]> {
     }
 }
 
-/// The value that the part `q` of the finite voxels stays below; at least a millionth of the largest, so that it spans something.
+/// The `q`-quantile of the finite voxels' values. It is at least a millionth of the largest value, so that the range is not empty.
 fn quantile(volume: &Volume, q: f64) -> f64 {
     let mut values: Vec<f32> =
         (0..volume.voxels().len()).map(|i| volume.voxels().get_f32(i)).filter(|v| v.is_finite()).collect();
@@ -56,7 +57,7 @@ fn quantile(volume: &Volume, q: f64) -> f64 {
 }
 
 impl TransferFunction {
-    /// The valid function of a request for `volume`. `at` is its JSON pointer. Also the name of what was taken.
+    /// The valid function of a request for `volume`, and a description of its source. `at` is its JSON pointer.
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the field.
@@ -120,7 +121,7 @@ impl TransferFunction {
         Ok(Self::Labels(table))
     }
 
-    /// The values between which the function changes: what a table of it has to cover.
+    /// The interval of values in which the function changes. A table of the function has to cover it.
     pub fn domain(&self) -> [f64; 2] {
         let [low, high] = match self {
             Self::Points(points) => [points.first(), points.last()].map(|p| p.map_or(0.0, |p| p.value)),
@@ -142,7 +143,7 @@ impl TransferFunction {
         }
     }
 
-    /// The greatest change of opacity per unit of length with the value, by the device's table.
+    /// The greatest derivative of the opacity per unit of length by the value, from the device's table.
     pub fn steepest_slope(&self) -> f64 {
         let [low, high] = self.domain();
         let width = (high - low) / (TABLE_SIZE - 1) as f64;
@@ -150,8 +151,8 @@ impl TransferFunction {
         (1..TABLE_SIZE).map(|i| (sigma(i) - sigma(i - 1)).abs() / width).fold(0.0, f64::max)
     }
 
-    /// The device's table for pre-integrated steps: for each entry the integrals from the first of extinction and of extinction
-    /// times red, green and blue over the entries, then the integrands, all as floats.
+    /// The device's table for pre-integrated steps, all as floats. Each entry has the integrals from the first entry of extinction and of
+    /// extinction times red, green and blue over the entries, then the integrands.
     pub fn integrals(&self, opacity_scale: f64) -> Vec<u32> {
         let [low, high] = self.domain();
         let integrand = |i: usize| {
@@ -171,7 +172,7 @@ impl TransferFunction {
         table
     }
 
-    /// The intervals of values that the device's table gives any opacity, in rising order.
+    /// The intervals of values that have an opacity in the device's table, in rising order.
     pub fn opaque(&self) -> Vec<[f64; 2]> {
         let [low, high] = self.domain();
         let width = (high - low) / (TABLE_SIZE - 1) as f64;
@@ -180,7 +181,8 @@ impl TransferFunction {
             if self.evaluate(low + width * i as f64).1 <= 0.0 {
                 continue;
             }
-            // Opacity begins and ends at the entries before and after, less what is nothing; the outermost stand for all beyond.
+            // Opacity begins at the entry before and ends at the entry after, less a small margin. The first and the last entry stand for
+            // all values beyond them.
             let from = if i == 0 { f64::NEG_INFINITY } else { low + width * (i as f64 - 0.999) };
             let to = if i == TABLE_SIZE - 1 { f64::INFINITY } else { low + width * (i as f64 + 0.999) };
             match intervals.last_mut() {
@@ -202,9 +204,9 @@ impl TransferFunction {
     }
 }
 
-/// A colour and an opacity in two words, as `optical` in `kernels/shared/optical.h` takes them apart: the float of the opacity,
-/// rounded to 13 bits after the point, with blue in its ten lowest and two highest bits; then red and green, turned to where a
-/// float's fraction has them.
+/// A colour and an opacity in two words; `optical` in `kernels/shared/optical.h` unpacks them. The first word is the float of the opacity,
+/// rounded to 13 bits after the point, with blue in its ten lowest and two highest bits. The second word is red and green, rotated to the
+/// place of a float's fraction.
 pub(crate) fn pack(color: [f64; 3], opacity: f64) -> [u32; 2] {
     let bits = |c: f64, most: f64| (c.clamp(0.0, 1.0) * most).round() as u32;
     let [red, green, blue] = [bits(color[0], 65535.0), bits(color[1], 65535.0), bits(color[2], 4095.0)];

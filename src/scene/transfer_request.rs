@@ -1,4 +1,4 @@
-//! A transfer function as a request has it.
+//! The wire type of a transfer function.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -29,7 +29,7 @@ pub struct TransferRequest {
 }
 
 impl TransferRequest {
-    /// True if it asks for a label volume's colours.
+    /// True if the request asks for a label volume's colours.
     pub fn is_labels(&self) -> bool {
         self.labels.is_some() || self.preset.as_deref() == Some("labels")
     }

@@ -1,4 +1,4 @@
-//! Window and level with a colour map: which values are shown, and as which colours. A table of linear colours for the device.
+//! Window and level with a colour map: the range of values that is shown, and its colours. The device gets a table of linear colours.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -7,7 +7,8 @@ use super::presets::linear;
 use crate::error::{Error, Result};
 use crate::volume::Volume;
 
-/// Entries of the device's table; `WINDOW_SIZE` in `kernels/shared/window.h`. The device takes it as linear between entries.
+/// The number of entries of the device's table: `WINDOW_SIZE` in `kernels/shared/window.h`. The device interpolates linearly between
+/// entries.
 pub const WINDOW_SIZE: usize = 1024;
 
 /// The values from the first to the last colour: level and width, as radiologists give them, or the two ends.
@@ -32,7 +33,7 @@ pub struct Window {
 }
 
 impl WindowRequest {
-    /// The ends that are asked for. `at` is its JSON pointer.
+    /// The ends that the request asks for. `at` is its JSON pointer.
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the field.
@@ -56,19 +57,19 @@ impl WindowRequest {
 }
 
 impl Window {
-    /// From `low` to `high`, or to a little more where that is no window.
+    /// A window from `low` to `high`. If `high` is not above `low`, the window ends a little above `low`.
     pub fn of(low: f64, high: f64) -> Self {
         let least = (low.abs() * 1e-3).max(1e-3);
         Self { low, high: if high > low { high } else { low + least } }
     }
 
-    /// The volume's range.
+    /// A window over the volume's range.
     pub fn range(volume: &Volume) -> Self {
         let [low, high] = volume.range();
         Self::of(low, high)
     }
 
-    /// Table entry = value × scale + offset.
+    /// The scale and the offset of table entry = value × scale + offset.
     pub fn scale_and_offset(&self) -> [f32; 2] {
         let scale = (WINDOW_SIZE - 1) as f64 / (self.high - self.low);
         [scale as f32, (-self.low * scale) as f32]
@@ -125,7 +126,7 @@ impl ColorMap {
             Self::Cividis => table(colorous::CIVIDIS, f),
             Self::Turbo => table(colorous::TURBO, f),
             Self::Hot => [ramp(0.0, 0.375), ramp(0.375, 0.75), ramp(0.75, 1.0)],
-            // Seven eighths grey and an eighth of `hot` from the other side, which is what Matlab's `bone` is.
+            // Matlab's `bone`: seven eighths grey and an eighth of `hot` with its channels in reverse order.
             Self::Bone => {
                 let hot = [ramp(0.75, 1.0), ramp(0.375, 0.75), ramp(0.0, 0.375)];
                 hot.map(|h| (7.0 * f + h) / 8.0)
@@ -135,7 +136,7 @@ impl ColorMap {
         srgb.map(linear)
     }
 
-    /// The device's table: red, green, blue and a 0 an entry, as the bits of floats; `invert` turns the map round.
+    /// The device's table. An entry has red, green, blue and a 0, as the bits of floats. `invert` reverses the map.
     pub fn table(self, invert: bool) -> Vec<u32> {
         let entry = |i: usize| {
             let f = i as f64 / (WINDOW_SIZE - 1) as f64;

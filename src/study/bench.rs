@@ -1,4 +1,4 @@
-//! Runs requests on an engine of this process, and reads numbers from what comes out.
+//! Runs requests on an engine of this process, and reads numbers from the results.
 
 use std::sync::Arc;
 
@@ -20,9 +20,9 @@ use crate::volume::RawQuery;
 pub enum Reads {
     /// The linear luminance of every pixel.
     Luminance,
-    /// The mean luminance of each block of so many pixels a side.
+    /// The mean luminance of each block of this many pixels a side.
     Blocks(usize),
-    /// What gets through every pixel: 1 − alpha.
+    /// The transmittance of every pixel: 1 − alpha.
     Transmittance,
     /// Fractions of the launched weight, by their names in the ledger.
     Ledger(&'static [&'static str]),
@@ -33,19 +33,19 @@ pub enum Reads {
 /// A finished render as the study sees it.
 #[derive(Debug, Clone)]
 pub struct Run {
-    /// What was read.
+    /// The numbers that were read.
     pub values: Vec<f64>,
-    /// Time on the device.
+    /// The time on the device.
     pub device_ms: f64,
-    /// Time from asking to the final frame.
+    /// The time from asking to the final frame.
     pub wall_ms: f64,
     /// Samples per pixel.
     pub samples: u64,
-    /// Bytes of the film and, where there is one, of the field.
+    /// The bytes of the film and, if there is one, of the field.
     pub bytes: u64,
-    /// What the reply says its error is.
+    /// The error that the reply states.
     pub stated_error: Option<f64>,
-    /// True if its noise is that of random samples: known, where that of evenly spread ones is a bound.
+    /// True if its noise is that of random samples. That noise is known; the noise of evenly spread samples is only bounded.
     pub noise_is_random: bool,
     /// The whole reply.
     pub reply: Value,
@@ -73,7 +73,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// Starts the service. Must be called on a thread of a tokio runtime that may block.
+    /// Starts the service. It must be called on a thread of a tokio runtime that may block.
     ///
     /// # Errors
     /// [`crate::error::Error::Internal`] when the device or the folder cannot be used.
@@ -81,7 +81,7 @@ impl Bench {
         Self::of(Service::start(args.device_config(), &args.data_dir(), limits)?)
     }
 
-    /// A bench on a service that runs already. Must be called as [`Bench::new`].
+    /// A bench on a service that runs already. It must be called as [`Bench::new`].
     ///
     /// # Errors
     /// [`crate::error::Error::Internal`] when its device failed.
@@ -91,12 +91,12 @@ impl Bench {
         Ok(Self { service, handle, device })
     }
 
-    /// What the device says of itself.
+    /// The device's description of itself.
     pub fn device(&self) -> &DeviceInfo {
         &self.device
     }
 
-    /// What is stored.
+    /// The stored assets.
     pub fn assets(&self) -> &Assets {
         self.service.assets()
     }
@@ -112,7 +112,7 @@ impl Bench {
     /// The film of a finished request.
     ///
     /// # Errors
-    /// [`crate::error::Error::NotFound`] where it is not kept any more.
+    /// [`crate::error::Error::NotFound`] if it is not kept any more.
     pub fn film(&self, job: &Arc<Job>) -> Result<Arc<Film>> {
         self.handle.block_on(self.service.engine().film(job))
     }
@@ -125,7 +125,7 @@ impl Bench {
         self.handle.block_on(self.service.planner().plan(request))
     }
 
-    /// Every setting that the planner could have chosen for a request, in words and as a request; the first is the reference.
+    /// Every setting that the planner could have chosen for a request, in words and as a request. The first is the reference.
     ///
     /// # Errors
     /// Those of the request.
@@ -133,7 +133,7 @@ impl Bench {
         self.handle.block_on(self.service.planner().settings(request))
     }
 
-    /// Runs a request and reads from it.
+    /// Runs a request and reads numbers from it.
     ///
     /// # Errors
     /// As [`Bench::finish`].
@@ -154,8 +154,8 @@ impl Bench {
         })
     }
 
-    /// Puts a volume of floats in the store, `value` at the voxels' centres in the box [−½, ½] · `size`, and returns what goes
-    /// under `volume`.
+    /// Puts a volume of floats in the store, `value` at the voxels' centres in the box [−½, ½] · `size`, and returns the value of a
+    /// request's `volume`.
     ///
     /// # Errors
     /// Those of the store.

@@ -1,4 +1,4 @@
-//! What a setting really costs for an error: a truth, and more and more samples until they are enough.
+//! The real cost of a setting for an error, by a truth and by more and more samples until they are enough.
 
 use serde_json::{Value, json};
 
@@ -6,25 +6,25 @@ use super::bench::{Bench, Reads, Run};
 use super::measure::{measure, median};
 use crate::error::Result;
 
-/// The truth's noise, of the error asked for: of evenly spread samples, and of random ones.
+/// The truth's noise as a part of the error asked for: of evenly spread samples, and of random ones.
 const TRUTH_NOISE: [f64; 2] = [0.2, 0.5];
-/// The most samples that are tried by force, and that a truth has.
+/// The most samples that are tried by force, and the most samples of a truth.
 const MOST_SAMPLES: u64 = 4096;
 const MOST_TRUTH: u64 = 8192;
-/// A render that takes less, ms, is timed so often.
+/// A render that takes less than this, ms, is timed `REPEATS` times.
 const SHORT: f64 = 100.0;
 const REPEATS: usize = 5;
-/// Turns in which the plan and the cheapest setting are timed, where that takes longer.
+/// The number of turns in which the plan and the cheapest setting are timed, if a render takes longer.
 const TURNS: usize = 3;
 
-/// A truth and how well it is known.
+/// A truth and its noise.
 pub(super) struct Known {
     values: Vec<f64>,
     noise: f64,
 }
 
 impl Known {
-    /// The relative error of a run, less what is random in the truth's own.
+    /// The relative error of a run, less the random part of the truth's own error.
     ///
     /// # Errors
     /// Those of [`measure`].
@@ -34,16 +34,16 @@ impl Known {
     }
 }
 
-/// The request with a number of samples for all of its budget.
+/// The request with a number of samples as its whole budget.
 pub(super) fn with_samples(request: &Value, samples: u64) -> Value {
     let mut request = request.clone();
     request["budget"] = json!({"samples": samples});
     request
 }
 
-/// The reference setting with other random numbers at other places, until it is known well enough: the means of 2 × 2 pixels of a
-/// picture twice as large each way, by two seeds. What these differ by is what is random in their mean; what the places miss they have in
-/// common, and it is not taken off. Of paths by weighted tracking.
+/// The truth: renders of the reference setting with other random numbers at other places, until their mean is known well enough. The values
+/// are the means of 2 × 2 pixels of a picture twice as large each way, by two seeds. The difference of the two tells the random error of
+/// their mean. The error of the places is common to both, and it is not taken off. Paths use weighted tracking.
 pub(super) fn truth(bench: &Bench, reference: &Value, asked: f64) -> Result<Known> {
     let mut request = reference.clone();
     for side in ["width", "height"] {
@@ -66,7 +66,7 @@ pub(super) fn truth(bench: &Bench, reference: &Value, asked: f64) -> Result<Know
         let noise = 0.5 * stated * if random { 0.5f64.sqrt() } else { 1.0 };
         if noise <= most || samples >= MOST_TRUTH {
             let values: Vec<f64> = a.values.iter().zip(&b.values).map(|(a, b)| 0.5 * (a + b)).collect();
-            // Each is wrong by half of what they differ by.
+            // Each is wrong by half of their difference.
             let noise = measure(&[a.values], &values)?.rmse;
             return Ok(Known { values, noise });
         }
@@ -75,7 +75,7 @@ pub(super) fn truth(bench: &Bench, reference: &Value, asked: f64) -> Result<Know
     }
 }
 
-/// A run and its device time: of a short one the median of several.
+/// A run and its device time. The time of a short run is the median of several.
 pub(super) fn timed(bench: &Bench, request: &Value) -> Result<(Run, f64)> {
     let run = bench.run(request, Reads::Luminance)?;
     let mut times = vec![run.device_ms];
@@ -85,7 +85,7 @@ pub(super) fn timed(bench: &Bench, request: &Value) -> Result<(Run, f64)> {
     Ok((run, median(&times)))
 }
 
-/// Device times of the plan and of the cheapest setting, medians of several taken in turns: the machine has other work
+/// The device times of the plan and of the cheapest setting. They are medians of several runs in turns, since the machine has other work
 /// too. A plan takes `about_ms`.
 pub(super) fn in_turns(bench: &Bench, about_ms: f64, plan: &Value, cheapest: &Value) -> Result<(f64, f64)> {
     let mut times = [Vec::new(), Vec::new()];
@@ -97,8 +97,8 @@ pub(super) fn in_turns(bench: &Bench, about_ms: f64, plan: &Value, cheapest: &Va
     Ok((median(&times[0]), median(&times[1])))
 }
 
-/// The least device time at which a setting is within the error, if that is less than `dearest`, and the samples: of random paths between
-/// the last number of them that is not enough and the first that is, as a power law says.
+/// The least device time at which a setting is within the error, if that is less than `dearest`, and the number of samples. For random
+/// paths a power law gives the number between the last that is not enough and the first that is.
 pub(super) fn least_ms(
     bench: &Bench,
     setting: &Value,
@@ -112,7 +112,7 @@ pub(super) fn least_ms(
         let (run, time) = timed(bench, &with_samples(setting, samples))?;
         let error = known.error(&run)?;
         if error <= asked {
-            // Between two numbers of samples the error of random paths is known; of places that are spread evenly it jumps.
+            // Between two numbers of samples the error of random paths is known; the error of evenly spread places jumps.
             let random = setting["technique"] == "volume_path" || setting["technique"] == "single_scatter";
             return Ok(Some(before.filter(|_| random).map_or((time, samples), |(fewer, worse, ms)| {
                 let [few, many] = [fewer as f64, samples as f64];
@@ -121,7 +121,8 @@ pub(super) fn least_ms(
                 (ms + (time - ms) * (needed - few) / (many - few), needed as u64)
             })));
         }
-        // A bias that four times the samples do not take away, evenly spread as they may be, or a time that does not come back.
+        // The setting has a bias that four times the samples do not take away, evenly spread as they may be, or it is too slow to be the
+        // cheapest.
         let earlier = errors.len().checked_sub(2).map(|i| errors[i]);
         errors.push(error);
         if samples > 16 && earlier.is_some_and(|worse| error > 0.9 * worse) || time > dearest {

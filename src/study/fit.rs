@@ -1,6 +1,6 @@
 //! The Pareto front, and the fastest setting for an error.
 
-/// Which points no other beats in both: none that is faster is as good, none that is as fast is better.
+/// True for the points that no other point beats in both: no faster point is as good, and no point that is as fast is better.
 pub fn pareto(points: &[(f64, f64)]) -> Vec<bool> {
     let beats = |a: &(f64, f64), b: &(f64, f64)| a.0 <= b.0 && a.1 <= b.1 && a != b;
     points.iter().map(|p| !points.iter().any(|other| beats(other, p))).collect()

@@ -1,4 +1,4 @@
-//! How different two pictures look: FLIP (Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström, Fairchild, "FLIP: A Difference
+//! The visible difference of two pictures: FLIP (Andersson, Nilsson, Akenine-Möller, Oskarsson, Åström, Fairchild, "FLIP: A Difference
 //! Evaluator for Alternating Images", HPG 2020), by its authors' own code.
 
 use nv_flip::{DEFAULT_PIXELS_PER_DEGREE, FlipImageRgb8, FlipPool, flip};
@@ -14,7 +14,7 @@ fn grey(values: &[f64]) -> Vec<u8> {
 /// The mean of FLIP over two pictures of linear luminance, 0 (the same) to 1, at the distance that its authors assume.
 ///
 /// # Errors
-/// [`Error::Internal`] where a picture is not of the size, or there is none.
+/// [`Error::Internal`] if a picture is not of the size, or has no pixels.
 pub fn mean_flip(reference: &[f64], test: &[f64], [width, height]: [usize; 2]) -> Result<f64> {
     if width * height == 0 {
         return Err(Error::internal("a picture without pixels"));

@@ -1,12 +1,12 @@
-//! The study's arithmetic: what many runs of one setting are wrong by, against a truth.
+//! The study's arithmetic: the errors of many runs of one setting against a truth.
 //!
-//! Of R runs of N values v_ri against t_i, with m_i the mean over the runs and s the mean of |t_i|:
+//! For R runs of N values v_ri against t_i, with m_i the mean over the runs and s the mean of |t_i|:
 //!
 //! | number | formula |
 //! |---|---|
 //! | `rmse` | √(mean over r and i of (v_ri − t_i)²) / s |
 //! | `bias` | mean over i of (m_i − t_i), over s; its interval by Student's t from the spread of the runs' own means |
-//! | `bias_rms` | √(mean over i of ((m_i − t_i)² − var_i / R)) / s: what no further run takes away |
+//! | `bias_rms` | √(mean over i of ((m_i − t_i)² − var_i / R)) / s: the part that no further run takes away |
 //! | `noise` | √(mean over i of var_i) / s, var_i the variance over the runs |
 //! | `p99` | the 99th percentile of \|v_ri − t_i\| / s |
 
@@ -16,23 +16,23 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::error::{Error, Result};
 
-/// What the interval of a bias promises.
+/// The confidence level of the interval of a bias.
 const CONFIDENCE: f64 = 0.95;
 
-/// What the runs of a setting are wrong by, relative to the mean magnitude of the truth.
+/// The errors of a setting's runs, relative to the mean magnitude of the truth.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
     /// Root of the mean squared error.
     pub rmse: f64,
-    /// The mean error, by its sign.
+    /// The mean error, with its sign.
     pub bias: f64,
-    /// Half of the 95 % interval of `bias`; none of a single run.
+    /// Half of the 95 % interval of `bias`; `None` for a single run.
     pub bias_within: Option<f64>,
-    /// Root of the mean squared error of the runs' mean, less its noise; none of a single run.
+    /// Root of the mean squared error of the runs' mean, less its noise; `None` for a single run.
     pub bias_rms: Option<f64>,
-    /// Root of the mean variance of a run; none of a single run.
+    /// Root of the mean variance of a run; `None` for a single run.
     pub noise: Option<f64>,
-    /// What 99 in 100 values are at most wrong by.
+    /// The error that 99 in 100 values do not exceed.
     pub p99: f64,
 }
 
@@ -80,7 +80,7 @@ pub fn measure(runs: &[Vec<f64>], truth: &[f64]) -> Result<Measured> {
     })
 }
 
-/// The middle one, or the mean of the two in the middle; 0 of none.
+/// The median: the middle value, or the mean of the two in the middle; 0 for no values.
 pub fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -118,7 +118,7 @@ mod tests {
         let honest = measure(&runs(0.0, 0.05, 20), &truth).expect("a measurement");
         assert!(honest.bias.abs() <= honest.bias_within.expect("an interval"), "{honest:?}");
         assert!(honest.bias_rms.expect("of several") < 0.004, "{honest:?}");
-        // Of normal noise one in a hundred is beyond 2.576 deviations.
+        // One in a hundred values of normal noise is beyond 2.576 deviations.
         assert!((honest.p99 / 0.05 - 2.576).abs() < 0.12, "{honest:?}");
     }
 
@@ -131,7 +131,7 @@ mod tests {
             found.bias.abs() <= found.bias_within.unwrap_or(0.0)
         };
         let held = (1..=1000).filter(|trial| covers(*trial)).count();
-        // 950 with a deviation of 7.
+        // The expectation is 950 with a deviation of 7.
         assert!((925..=975).contains(&held), "{held} of 1000 intervals of four runs hold the truth");
     }
 

@@ -1,8 +1,8 @@
-//! The study: speed against accuracy, and where methods fail.
+//! The study: speed against accuracy, and the failures of methods.
 //!
-//! A [`Case`] is a scene with a truth that the technique under test had no part in: a closed form, a published table, a
-//! double-precision reference of the host (`oracle`), or a long run of another unbiased technique. A [`Setting`] is a technique
-//! with its options. Each is run with several seeds; `measure` says what it is wrong by, `fit` what its error follows.
+//! A [`Case`] is a scene with a truth that the technique under test had no part in: a closed form, a published table, a double-precision
+//! reference of the host (`oracle`), or a long run of another unbiased technique. A [`Setting`] is a technique with its options. Each is
+//! run with several seeds; `measure` gives its errors, and `fit` finds the best settings.
 //!
 //! A technique joins with a file in `cases/` and a line in [`CASES`].
 
@@ -19,8 +19,8 @@ pub mod oracle;
 mod page;
 pub mod planner;
 pub mod record;
+pub mod results;
 mod run;
-pub mod shelf;
 pub mod stability;
 mod table;
 pub mod verdict;
@@ -34,7 +34,7 @@ use serde_json::{Value, json};
 use crate::error::Result;
 use bench::{Bench, Reads};
 
-/// How much work is put into a study.
+/// The amount of work that is put into a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scale {
     /// Seconds a case: the shape of the chart, fewer seeds and settings.
@@ -55,39 +55,39 @@ impl Scale {
     }
 }
 
-/// A scene with a truth, and what is tried on it.
+/// A scene with a truth, and the settings that are tried on it.
 pub struct Case {
-    /// Its name: of its file, and in `/v1/studies`.
+    /// Its name, in the name of its file and in `/v1/studies`.
     pub name: &'static str,
-    /// What it is, in a line.
+    /// Its title, a line of words.
     pub title: &'static str,
-    /// Of whom has a scene like it: "you have …",
+    /// The user's scene like it, as the end of "you have …".
     pub when: &'static str,
-    /// and what to choose then, in plain words.
+    /// The choice for such a scene, in plain words.
     pub choose: &'static str,
-    /// Makes its truth and its settings; none where what it needs is not on this machine, with what that is.
+    /// The function that makes its truth and its settings. It gives the reason instead if something that it needs is not on this machine.
     pub trial: fn(&Bench, Scale) -> Result<std::result::Result<Trial, String>>,
 }
 
 /// The truth of a case and the settings that are tried.
 pub struct Trial {
-    /// What they are compared with.
+    /// The truth that they are compared with.
     pub truth: Truth,
-    /// By line, in their order.
+    /// The settings by line, in their order.
     pub settings: Vec<Setting>,
 }
 
-/// What is true.
+/// The true values of a case.
 pub struct Truth {
-    /// Where it comes from, in words.
+    /// The source of the values, in words.
     pub words: String,
-    /// Means over whole pixels, or numbers of a ledger.
+    /// The means over whole pixels, or numbers of a ledger.
     pub values: Vec<f64>,
-    /// Of the pixels' centres, for settings of one sample; where there is none, `values` serve for them too.
+    /// The values at the pixels' centres, for settings of one sample. Without them, `values` serve for these settings too.
     pub centres: Option<Vec<f64>>,
-    /// Width and height, of a picture.
+    /// The width and the height, if the truth is a picture.
     pub size: Option<[usize; 2]>,
-    /// How well it is known, relative to its mean.
+    /// The error of the truth itself, relative to its mean.
     pub known_to: f64,
 }
 
@@ -96,17 +96,17 @@ pub struct Truth {
 pub struct Setting {
     /// The line that it belongs to.
     pub line: String,
-    /// What the settings of the line differ by,
+    /// The parameter by which the settings of the line differ.
     pub of: &'static str,
-    /// and its value here.
+    /// The value of this parameter.
     pub at: f64,
-    /// The power of it that the error should follow.
+    /// The power of `at` that the error should follow.
     pub expected_slope: Option<f64>,
-    /// What is read.
+    /// The numbers that are read from a run.
     pub reads: Reads,
     /// True if it looks at the pixels' centres alone.
     pub centres: bool,
-    /// True if its errors are random, so that seeds tell them.
+    /// True if its errors are random, so that they differ from seed to seed.
     pub random: bool,
     /// The render request, less its seed.
     pub request: Value,
@@ -126,7 +126,7 @@ impl Setting {
         Self { line, of, at, expected_slope, reads: Reads::Luminance, centres: false, random: true, request }
     }
 
-    /// The same, with another reading.
+    /// The same setting with another reading.
     pub fn reading(self, reads: Reads) -> Self {
         Self { reads, ..self }
     }
@@ -138,7 +138,7 @@ pub fn view(technique: &str, volume: &Value, camera: &Value, side: usize, sample
         "budget": {"samples": samples}, technique: own})
 }
 
-/// A render request of a simulation, of which only the ledger is looked at.
+/// A render request of a simulation, of which only the ledger is read.
 pub fn simulation(parameters: &Value) -> Value {
     json!({"technique": "projection", "volume": {"photon_transport": parameters},
         "image": {"width": 8, "height": 8}, "budget": {"samples": 1}})

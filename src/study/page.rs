@@ -1,4 +1,4 @@
-//! The page of plain words: what to choose when.
+//! The page of plain words, which recommends a setting for each kind of scene.
 
 use super::record::Record;
 use super::{CASES, table};

@@ -1,4 +1,5 @@
-//! Checks that the planner keeps its word: random scenes, each planned, rendered as planned, and compared with every setting tried by force.
+//! A check that the planner keeps its word: random scenes, each planned, rendered as planned, and compared with every setting tried by
+//! force.
 
 use std::ops::Range;
 
@@ -13,64 +14,64 @@ use super::record::Machine;
 use crate::error::Result;
 use crate::plan::Plan;
 
-/// What a plan may cost over the cheapest setting that would have done, and a time over the predicted one or under it.
+/// The greatest factor of a plan's cost over the cheapest setting that would have done, and of a time over the predicted one or under it.
 const COST_FACTOR: f64 = 1.3;
 const TIME_FACTOR: f64 = 1.5;
 
-/// What came of one scene.
+/// The outcome of one scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
-    /// Which of the scenes.
+    /// The number of the scene.
     pub scene: u64,
-    /// What was asked for.
+    /// The request as it was asked for.
     pub request: Value,
     /// The error asked for.
     pub asked: f64,
-    /// What was rendered: technique, options, samples.
+    /// The rendered setting: technique, options, samples.
     pub planned: String,
-    /// The error of that picture; none of a plan that says itself that nothing is within the error, which is not run.
+    /// The error of that picture; `None` if the plan itself says that nothing is within the error, since such a plan is not run.
     pub true_error: Option<f64>,
-    /// Device times.
+    /// The predicted device time, ms.
     pub predicted_ms: f64,
-    /// See `predicted_ms` and `true_error`.
+    /// The measured device time, ms; `None` as for `true_error`.
     pub measured_ms: Option<f64>,
-    /// The cheapest setting that would have done, and its time; none where none that was tried does.
+    /// The cheapest setting that would have done; `None` if no setting that was tried does.
     pub cheapest: Option<String>,
-    /// See `cheapest`.
+    /// The device time of `cheapest`, ms.
     pub cheapest_ms: Option<f64>,
 }
 
-/// What came of all scenes.
+/// The outcomes of all scenes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Planned {
-    /// Where it was measured.
+    /// The machine of the measurement.
     pub machine: Machine,
-    /// Scene by scene.
+    /// The outcomes, scene by scene.
     pub scenes: Vec<Outcome>,
 }
 
 impl Outcome {
-    /// The true error is at most the one asked for.
+    /// True if the true error is at most the one asked for.
     pub fn is_met(&self) -> bool {
         self.true_error.is_some_and(|error| error <= self.asked)
     }
 
-    /// The device took about as long as predicted.
+    /// True if the device took about as long as predicted.
     pub fn is_in_time(&self) -> bool {
         let ratio = self.measured_ms.map(|ms| ms / self.predicted_ms);
         ratio.is_some_and(|ratio| (1.0 / TIME_FACTOR..=TIME_FACTOR).contains(&ratio))
     }
 
-    /// It cost about as little as it could.
+    /// True if it cost about as little as it could.
     pub fn is_cheap(&self) -> bool {
-        // Where no setting that was tried by force is enough, a plan that is has found the cheapest.
+        // If no setting that was tried by force is enough, a plan that is enough has found the cheapest.
         let within = |(least, ms): (f64, f64)| ms <= COST_FACTOR * least;
         self.cheapest_ms.zip(self.measured_ms).map_or(self.is_met(), within)
     }
 }
 
 impl Planned {
-    /// How many plans kept to the error, to the time, and to the cost.
+    /// The number of plans that kept to the error, to the time, and to the cost.
     pub fn figures(&self) -> [usize; 3] {
         let count = |kept: fn(&Outcome) -> bool| self.scenes.iter().filter(|s| kept(s)).count();
         [count(Outcome::is_met), count(Outcome::is_in_time), count(Outcome::is_cheap)]
@@ -115,10 +116,10 @@ impl Planned {
     }
 }
 
-/// A range of scenes, as 20..40.
+/// A range of scenes from text such as 20..40.
 ///
 /// # Errors
-/// What would be one.
+/// The reason that the text is no range.
 pub fn scenes(text: &str) -> std::result::Result<Range<u64>, String> {
     let ends = text.split_once("..").and_then(|(from, to)| Some(from.parse().ok()?..to.parse().ok()?));
     ends.filter(|r: &Range<u64>| !r.is_empty()).ok_or_else(|| format!("'{text}' is not a range such as 20..40"))
@@ -141,10 +142,10 @@ pub fn planner(bench: &Bench, scenes: Range<u64>, told: &mut dyn FnMut(&str)) ->
     Ok(Planned { machine: machine(bench), scenes: outcomes })
 }
 
-/// Scenes from this one on are of voxels finer than the pixels.
+/// The first scene of those with voxels finer than the pixels.
 const FINE: u64 = 100;
 
-/// A random scene: three in five scatter light, the others are composites, as are those of fine voxels.
+/// A random scene. Three in five scatter light; the others are composites, as are those of fine voxels.
 fn scene(seed: u64) -> Value {
     let mut random = Random::new(1000 + seed);
     let mut unit = || random.unit();
@@ -178,7 +179,7 @@ fn scene(seed: u64) -> Value {
     request
 }
 
-/// Of a plan that says itself that nothing which is permitted is within the error: it is not run, and kept to nothing.
+/// The outcome of a plan that says itself that nothing permitted is within the error. It is not run, and counts as missed.
 fn not_enough(scene: u64, request: &Value, asked: f64, plan: &Plan) -> Outcome {
     Outcome {
         scene,
@@ -206,7 +207,7 @@ fn outcome(bench: &Bench, scene: u64, request: &Value) -> Result<Outcome> {
     let known = truth(bench, &settings[0].1, asked)?;
     let (run, mut measured_ms) = timed(bench, &plan.request)?;
     let true_error = known.error(&run)?;
-    // What is dearer than the plan, or than the cheapest so far, need not be tried any further.
+    // A setting that is dearer than the plan, or than the cheapest so far, need not be tried any further.
     let mut cheapest: Option<(f64, String, Value)> =
         (true_error <= asked).then(|| (measured_ms, "the plan".into(), plan.request.clone()));
     for (words, setting) in &settings {
@@ -233,7 +234,7 @@ fn outcome(bench: &Bench, scene: u64, request: &Value) -> Result<Outcome> {
     })
 }
 
-/// What a plan added to a request, and the lights that it left out.
+/// The options that a plan added to a request, and the number of lights that it left out.
 fn words(request: &Value, plan: &Plan, samples: u64) -> String {
     let given = &request[plan.technique.as_str()];
     let options = plan.options.as_object().into_iter().flatten().filter(|(name, value)| given.get(name) != Some(value));

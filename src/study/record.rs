@@ -1,35 +1,35 @@
-//! What a study leaves: JSON from which its chart and its tables are made.
+//! The record of a study: JSON from which its chart and its tables are made.
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::measure::Measured;
 
-/// Where and on what the numbers were taken.
+/// The machine and the program that the numbers were taken on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Machine {
     /// The processor, as the system names it.
     pub processor: String,
-    /// Threads that run at a time.
+    /// The number of threads that run at a time.
     pub threads: usize,
-    /// The OpenCL device, its platform with its version, and its driver.
+    /// The OpenCL device.
     pub device: String,
-    /// See `device`.
+    /// The OpenCL platform with its version.
     pub platform: String,
-    /// See `device`.
+    /// The driver of the device.
     pub driver: String,
-    /// Rays or photons of a work-item.
+    /// The number of rays or photons of a work-item.
     pub lanes: u32,
     /// This program's version.
     pub version: String,
     /// The commit that it was built from, if known.
     pub commit: String,
-    /// When, in seconds since 1970.
+    /// The time of the measurement, in seconds since 1970.
     pub unix_s: u64,
 }
 
 impl Machine {
-    /// True if it is the same but for the time.
+    /// True if the two are the same but for the time.
     pub fn is_same(&self, other: &Self) -> bool {
         Self { unix_s: other.unix_s, ..self.clone() } == *other
     }
@@ -40,17 +40,17 @@ impl Machine {
 pub struct Record {
     /// Its name in `/v1/studies`.
     pub name: String,
-    /// What it is, in a line.
+    /// Its title, a line of words.
     pub title: String,
-    /// What the settings are compared with.
+    /// The truth that the settings are compared with.
     pub truth: String,
-    /// How well the truth itself is known, relative to its mean: errors below it are not told apart.
+    /// The error of the truth itself, relative to its mean. Errors below it are not told apart.
     pub truth_known_to: f64,
     /// True if it is the short form.
     pub quick: bool,
-    /// Where it was measured.
+    /// The machine of the measurement.
     pub machine: Machine,
-    /// Settings of one kind each.
+    /// The lines, each with settings of one kind.
     pub lines: Vec<Line>,
     /// The fastest setting for an error.
     pub equal_error: Vec<Choice>,
@@ -63,11 +63,11 @@ pub struct Record {
 pub struct Line {
     /// A technique with its options.
     pub name: String,
-    /// What the settings differ by.
+    /// The parameter by which the settings differ.
     pub of: String,
-    /// The power of that number that the error should follow, where there is one.
+    /// The power of that parameter that the error should follow, if there is one.
     pub expected_slope: Option<f64>,
-    /// The power that it follows.
+    /// The power that the error follows.
     pub slope: Option<f64>,
     /// The settings.
     pub points: Vec<Point>,
@@ -76,26 +76,26 @@ pub struct Line {
 /// One setting, measured.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Point {
-    /// The number that the line's settings differ by.
+    /// The value of the parameter by which the line's settings differ.
     pub at: f64,
-    /// Time on the device, the median of the runs.
+    /// The time on the device, the median of the runs.
     pub device_ms: f64,
-    /// Time from asking to the final frame, the median of the runs.
+    /// The time from asking to the final frame, the median of the runs.
     pub wall_ms: f64,
-    /// What it is wrong by.
+    /// Its errors.
     #[serde(flatten)]
     pub error: Measured,
-    /// How different its picture looks, where it is one and the program has the feature `flip`.
+    /// The visible difference of its picture, if it has one and the program has the feature `flip`.
     pub flip: Option<f64>,
-    /// What its reply says its error is.
+    /// The error that its reply states.
     pub stated_error: Option<f64>,
     /// Samples per pixel.
     pub samples: u64,
-    /// Runs with seeds of their own.
+    /// The number of runs with seeds of their own.
     pub runs: usize,
-    /// Bytes of the film and the field.
+    /// The bytes of the film and the field.
     pub bytes: u64,
-    /// What must never be silent.
+    /// The counts that must never be silent.
     pub counts: Value,
     /// The codes of its warnings.
     pub warnings: Vec<String>,
@@ -105,12 +105,12 @@ pub struct Point {
     pub request: Value,
 }
 
-/// What to choose for an error or a time.
+/// The setting to choose for an error or a time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Choice {
     /// The error (relative) or the time (device milliseconds) that it has to stay within.
     pub bound: f64,
-    /// The line and the number of the setting; none where no setting does.
+    /// The line and the number of the setting; `None` if no setting stays within it.
     pub setting: Option<String>,
     /// Its device time.
     pub device_ms: Option<f64>,

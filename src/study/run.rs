@@ -18,7 +18,7 @@ pub const ERRORS: [f64; 3] = [0.1, 0.01, 0.001];
 /// The times of the table of the best settings, device milliseconds.
 const TIMES_MS: [f64; 4] = [1.0, 10.0, 100.0, 1000.0];
 
-/// Where the numbers are taken.
+/// The machine on which the numbers are taken.
 pub fn machine(bench: &Bench) -> Machine {
     let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = cpuinfo.lines().find_map(|l| l.strip_prefix("model name")?.split_once(':'));
@@ -36,7 +36,7 @@ pub fn machine(bench: &Bench) -> Machine {
     }
 }
 
-/// Measures every setting of a case; none, with the reason, where it cannot be run here. `told` hears of each setting.
+/// Measures every setting of a case, or gives the reason that it cannot be run here. `told` hears of each setting.
 ///
 /// # Errors
 /// Those of the requests, and of measuring.
@@ -149,7 +149,7 @@ fn point(bench: &Bench, setting: &Setting, truth: &Truth, scale: Scale) -> Resul
     })
 }
 
-/// The same request with next to no work in it: it compiles what there is to compile.
+/// The same request with next to no work in it. It compiles the kernels that the request needs.
 fn small(request: &serde_json::Value) -> serde_json::Value {
     let mut small = request.clone();
     small["image"] = json!({"width": 8, "height": 8});

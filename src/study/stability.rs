@@ -1,4 +1,4 @@
-//! Runs the experiments, and says in a page what came of them.
+//! Runs the experiments, and writes a page of their outcomes.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,33 +9,33 @@ use super::verdict::{Findings, Sample, Verdict};
 use super::{Scale, machine};
 use crate::error::Result;
 
-/// What came of an experiment.
+/// The outcome of an experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// Its name.
     pub name: String,
-    /// What is done, in a line.
+    /// Its title, a line of words.
     pub title: String,
-    /// What a right implementation shows.
+    /// The result of a right implementation.
     pub expected: String,
-    /// The worst of all places.
+    /// The worst verdict of all places.
     pub verdict: Verdict,
-    /// Places that are not what a closed form says, in words.
+    /// The places that differ from the closed form, in words.
     pub surprises: Vec<String>,
     /// True if it is the short form.
     pub quick: bool,
-    /// Where it was measured.
+    /// The machine of the measurement.
     pub machine: Machine,
-    /// What was measured.
+    /// The findings of the measurement.
     pub findings: Findings,
 }
 
-/// What came of all of them.
+/// The outcomes of all experiments.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Stability {
-    /// One by one.
+    /// The outcomes, one by one.
     pub experiments: Vec<Outcome>,
-    /// What fails elsewhere and whose technique is not here yet, and that technique.
+    /// Failures elsewhere whose technique is not here yet, and that technique.
     pub not_here_yet: Vec<[String; 2]>,
 }
 
@@ -58,7 +58,7 @@ pub fn outcome(bench: &Bench, experiment: &Experiment, scale: Scale) -> Result<O
     })
 }
 
-/// Runs the experiments `asked` for; `told` hears of each.
+/// Runs the experiments of `asked`; `told` hears of each.
 ///
 /// # Errors
 /// Those of their requests.

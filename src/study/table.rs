@@ -7,7 +7,7 @@ fn percent(v: f64) -> String {
     format!("{:.3} %", 100.0 * v)
 }
 
-/// The settings of a study with what they cost and are wrong by, and what to choose for an error.
+/// The settings of a study with their costs and errors, and the settings to choose for an error.
 pub fn table(record: &Record) -> String {
     let mut text = format!("\n## {}\n\nTruth: {}.\n\n", record.title, record.truth);
     text += "| setting | device | error | bias | noise | front | slope |\n|---|---|---|---|---|---|---|\n";

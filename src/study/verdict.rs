@@ -1,35 +1,35 @@
-//! What an experiment finds: a quantity measured on the way out of a method's domain, what it should be, what a closed form says
-//! that the method makes of it, and the verdict of these.
+//! The findings of an experiment: a quantity measured on the way out of a method's domain, its true value, the value that a closed form
+//! predicts for the method, and the verdict.
 
 use serde::{Deserialize, Serialize};
 
-/// Deviations of a measured mean that are taken for noise (VALIDATION.md).
+/// The deviations of a measured mean that are taken for noise (VALIDATION.md).
 const NOISE: f64 = 3.5;
-/// What single precision may be wrong by, relative.
+/// The greatest error of single precision, relative.
 const ROUNDING: f64 = 2e-5;
 
-/// What is made of a place in a sweep, of a sweep, or of an experiment: the later, the worse.
+/// The verdict on a place in a sweep, on a sweep, or on an experiment. The later ones are worse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Right to single precision.
     Exact,
-    /// What it is wrong by is not told from noise.
+    /// Not wrong by more than noise.
     Unbiased,
     /// Wrong by no more than it permits itself, or says of itself.
     Within,
-    /// Wrong, and says so.
+    /// Wrong, with a warning.
     BiasedAndFlagged,
-    /// Not a number or without bound, and says so.
+    /// Not a number or without bound, with a warning.
     DivergesAndFlagged,
-    /// Wrong, and says nothing: fails the build.
+    /// Wrong, without a warning: fails the build.
     BiasedAndSilent,
-    /// Not a number or without bound, and says nothing: fails the build.
+    /// Not a number or without bound, without a warning: fails the build.
     DivergesAndSilent,
 }
 
 impl Verdict {
-    /// In words.
+    /// The verdict in words.
     pub fn words(self) -> &'static str {
         match self {
             Self::Exact => "exact",
@@ -51,26 +51,26 @@ impl Verdict {
 /// One place in a sweep.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Sample {
-    /// Where.
+    /// The place: the value of the parameter of the sweep.
     pub at: f64,
-    /// What was measured; none where it is not finite.
+    /// The measured value; `None` if it is not finite.
     pub measured: Option<f64>,
-    /// Its standard error; 0 where nothing is random.
+    /// Its standard error; 0 if nothing is random.
     pub standard_error: f64,
-    /// What it should be.
+    /// The true value.
     pub truth: f64,
-    /// What a closed form says that the method makes of it.
+    /// The value that a closed form predicts for the method.
     pub predicted: Option<f64>,
-    /// What it may be wrong by, in its own unit: a bound that is published, or that the reply states.
+    /// The permitted error, in the unit of the value: a bound that is published, or that the reply states.
     pub permitted: f64,
     /// The codes of the reply's warnings.
     pub warnings: Vec<String>,
-    /// Time on the device.
+    /// The time on the device.
     pub device_ms: f64,
 }
 
 impl Sample {
-    /// What is made of it.
+    /// The verdict on this sample.
     pub fn verdict(&self) -> Verdict {
         let flagged = !self.warnings.is_empty();
         let Some(measured) = self.measured else {
@@ -87,7 +87,7 @@ impl Sample {
         }
     }
 
-    /// True if it is what was predicted, give or take noise and the part `tolerance`; none without a prediction.
+    /// True if the measured value is the predicted one within noise and the part `tolerance`; `None` without a prediction.
     pub fn as_predicted(&self, tolerance: f64) -> Option<bool> {
         let predicted = self.predicted?;
         let within = NOISE * self.standard_error + tolerance * predicted.abs().max(self.truth.abs());
@@ -100,39 +100,39 @@ impl Sample {
 pub struct Sweep {
     /// The technique with its options.
     pub method: String,
-    /// What a prediction may be off by, relative: terms that its closed form leaves out.
+    /// The permitted error of a prediction, relative, for terms that its closed form leaves out.
     pub tolerance: f64,
-    /// Place by place.
+    /// The samples, place by place.
     pub samples: Vec<Sample>,
 }
 
-/// Two parameters that matter together: what a method is wrong by, relative.
+/// The relative error of a method over two parameters that matter together.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct HeatMap {
-    /// What it is a map of.
+    /// The title of the map.
     pub title: String,
-    /// The two parameters, across and up,
+    /// The two parameters, across and up.
     pub axes: [String; 2],
-    /// and their values.
+    /// The values of the parameter across.
     pub across: Vec<f64>,
-    /// See `across`.
+    /// The values of the parameter up.
     pub up: Vec<f64>,
-    /// What a prediction may be off by, relative.
+    /// The permitted error of a prediction, relative.
     pub tolerance: f64,
     /// The samples: a row for each of `up`, from the first.
     pub samples: Vec<Vec<Sample>>,
 }
 
-/// What an experiment found.
+/// The findings of an experiment.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Findings {
-    /// What the sweeps go along.
+    /// The parameter of the sweeps.
     pub of: String,
-    /// What is measured, with its unit.
+    /// The measured quantity, with its unit.
     pub quantity: String,
-    /// Method by method.
+    /// The sweeps, method by method.
     pub sweeps: Vec<Sweep>,
-    /// Where two parameters matter.
+    /// The map, if two parameters matter.
     pub heat_map: Option<HeatMap>,
 }
 
@@ -143,12 +143,12 @@ impl Findings {
         self.sweeps.iter().flat_map(|sweep| sweep.samples.iter().map(|s| (sweep.method.as_str(), s))).chain(mapped)
     }
 
-    /// The worst of the samples'.
+    /// The worst verdict of the samples.
     pub fn verdict(&self) -> Verdict {
         self.samples().map(|(_, s)| s.verdict()).max().unwrap_or(Verdict::DivergesAndSilent)
     }
 
-    /// Places that are not what was predicted, in words.
+    /// The places that are not as predicted, in words.
     pub fn surprises(&self) -> Vec<String> {
         let of = |sweep: &Sweep| {
             let off = sweep.samples.iter().filter(|s| s.as_predicted(sweep.tolerance) == Some(false));
@@ -169,7 +169,7 @@ impl Findings {
         self.sweeps.iter().cloned().chain(mapped).flat_map(|sweep| of(&sweep)).collect()
     }
 
-    /// Leaves of the warnings those that tell of what is looked at.
+    /// Keeps the warnings with these codes, and drops the others.
     pub fn keep_codes(&mut self, codes: &[&str]) {
         let mapped = self.heat_map.iter_mut().flat_map(|map| map.samples.iter_mut().flatten());
         let swept = self.sweeps.iter_mut().flat_map(|sweep| &mut sweep.samples);
@@ -178,7 +178,7 @@ impl Findings {
 }
 
 impl Sweep {
-    /// The worst of the samples'.
+    /// The worst verdict of the samples.
     pub fn verdict(&self) -> Verdict {
         self.samples.iter().map(Sample::verdict).max().unwrap_or(Verdict::DivergesAndSilent)
     }

@@ -1,13 +1,13 @@
-//! What a bright ray sees of a volume: projections scale their windows and extinctions by it.
+//! The mean value along a bright ray of a volume. Projections scale their windows and extinctions by it.
 
 use super::Volume;
 
-/// Rays a side and samples a ray by which [`bright_mean`] looks at a volume.
+/// The rays a side and the samples a ray of [`bright_mean`].
 const LOOK_RAYS: usize = 32;
 const LOOK_SAMPLES: usize = 128;
 
-/// The mean of the finite voxels along a bright ray: what one in fifty of the rays along the grid's axes stays above. A mean over
-/// the whole volume would say little of a few vessels in much air.
+/// The mean of the finite voxels along a bright ray: one in fifty of the rays along the grid's axes is brighter. A mean over the whole
+/// volume would say little of a few vessels in much air.
 pub(super) fn bright_mean(volume: &Volume) -> f64 {
     let mut means: Vec<f64> = (0..3).flat_map(|axis| means_along(volume, axis)).collect();
     means.sort_by(f64::total_cmp);

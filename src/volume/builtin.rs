@@ -20,36 +20,36 @@ use super::{NewVolume, Volume, parallel};
 use crate::error::{Error, Result};
 use std::f64::consts::PI;
 
-/// Voxels along each side if a request does not say.
+/// The default number of voxels along each side.
 pub const DEFAULT_RESOLUTION: usize = 128;
 
-/// Permitted voxels along each side: below, nothing is recognisable; above, a volume takes more than 512 MiB.
+/// The permitted numbers of voxels along each side. Below, nothing is recognisable; above, a volume takes more than 512 MiB.
 pub const RESOLUTIONS: std::ops::RangeInclusive<usize> = 8..=512;
 
-/// Radius of `sphere`.
+/// The radius of `sphere`.
 pub const SPHERE_RADIUS: f64 = 0.8;
 
-/// Standard deviation of `gaussian`.
+/// The standard deviation of `gaussian`.
 pub const GAUSSIAN_SIGMA: f64 = 0.3;
 
-/// Density of `chamber`'s walls and lid.
+/// The density of `chamber`'s walls and lid.
 pub const CHAMBER_DENSE: f64 = 100.0;
-/// Density of the air in it.
+/// The density of the air in it.
 pub const CHAMBER_AIR: f64 = 0.1;
-/// Density of the fog on its floor at y = 0; it falls as 1 − y.
+/// The density of the fog on its floor at y = 0; it falls as 1 − y.
 pub const CHAMBER_FOG: f64 = 5.0;
 /// The fog lies below this height.
 pub const CHAMBER_FOG_TOP: f64 = 0.2;
-/// Lower and upper side of the lid.
+/// The lower and the upper side of the lid.
 pub const CHAMBER_LID: [f64; 2] = [0.78, 0.83];
-/// Square of the radius of the hole in the lid, whose axis is x = z = 0.5.
+/// The square of the radius of the hole in the lid, whose axis is x = z = 0.5.
 pub const CHAMBER_HOLE_RADIUS_SQUARED: f64 = 0.001;
-/// Thickness of the walls at x = 0, y = 0 and z = 1.
+/// The thickness of the walls at x = 0, y = 0 and z = 1.
 pub const CHAMBER_WALL: f64 = 0.02;
 
-/// Frequency of `marschner_lobb`.
+/// The frequency of `marschner_lobb`.
 pub const MARSCHNER_LOBB_FREQUENCY: f64 = 6.0;
-/// Amplitude of its ripple.
+/// The amplitude of its ripple.
 pub const MARSCHNER_LOBB_ALPHA: f64 = 0.25;
 
 /// A built-in volume.
@@ -57,7 +57,7 @@ pub const MARSCHNER_LOBB_ALPHA: f64 = 0.25;
 pub struct Builtin {
     /// Its name in a request.
     pub name: &'static str,
-    /// What its values cannot leave.
+    /// The bounds of its values.
     pub bounds: [f64; 2],
     /// True if the seed changes it.
     pub seeded: bool,
@@ -159,7 +159,7 @@ pub fn chamber_value(x: f64, y: f64, z: f64) -> f64 {
 /// Marschner & Lobb, "An evaluation of reconstruction filters for volume rendering" (Visualization 1994), eq. 9:
 /// ρ = (1 − sin(πz/2) + α(1 + ρᵣ(√(x² + y²)))) / 2(1 + α), ρᵣ(r) = cos(2π f cos(πr/2)), f = 6, α = 0.25.
 ///
-/// 40³ samples are just above its Nyquist rate: what a filter does wrong there, it does wrong visibly.
+/// 40³ samples are just above its Nyquist rate, so that a filter's errors are visible there.
 pub fn marschner_lobb_value(x: f64, y: f64, z: f64) -> f64 {
     let ripple = (2.0 * PI * MARSCHNER_LOBB_FREQUENCY * (PI * x.hypot(y) / 2.0).cos()).cos();
     let alpha = MARSCHNER_LOBB_ALPHA;

@@ -1,10 +1,10 @@
-//! Bytes from a body that may be gzip, never more of them than are asked for: a gzip bomb costs nothing.
+//! A reader of bytes from a body that may be gzip. It inflates no more bytes than are asked for, so that a gzip bomb costs nothing.
 
 use crate::error::{Error, Result};
 use flate2::bufread::MultiGzDecoder;
 use std::io::{ErrorKind, Read};
 
-/// Deflate cannot shrink by more than this (a 258-byte match takes at least 2 bits): the bound on what a body can hold.
+/// The greatest ratio by which deflate can shrink (a 258-byte match takes at least 2 bits). It bounds the number of bytes in a body.
 const MAX_RATIO: u64 = 1032;
 
 /// True if the bytes begin as gzip does (RFC 1952: the magic, and deflate, its only method).
@@ -18,9 +18,9 @@ pub(super) enum Source<'a> {
     Plain(&'a [u8]),
     /// A gzip stream of one or more members.
     Gzip {
-        /// Gives the inflated bytes.
+        /// The decoder that gives the inflated bytes.
         decoder: Box<MultiGzDecoder<&'a [u8]>>,
-        /// Length of the whole gzip stream.
+        /// The length of the whole gzip stream.
         compressed: usize,
     },
 }
@@ -41,7 +41,7 @@ impl<'a> Source<'a> {
         matches!(self, Self::Gzip { .. })
     }
 
-    /// No more bytes than this can be left.
+    /// The upper bound of the number of bytes that are left.
     pub fn at_most(&self) -> u64 {
         match self {
             Self::Plain(left) => left.len() as u64,
@@ -49,7 +49,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// A first guess at how many bytes are left, for reserving memory; never more than a few times the body.
+    /// An estimate of the number of bytes that are left, for reserving memory. It is never more than a few times the body.
     pub fn about(&self) -> usize {
         match self {
             Self::Plain(left) => left.len(),
@@ -57,7 +57,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Fills `buffer`, and returns how much of it was filled: less only at the end of the data.
+    /// Fills `buffer`, and returns the number of bytes that were filled. It is less than the buffer only at the end of the data.
     pub fn fill(&mut self, buffer: &mut [u8]) -> Result<usize> {
         let mut filled = 0;
         while filled < buffer.len() {
@@ -85,7 +85,7 @@ impl<'a> Source<'a> {
         Ok(filled)
     }
 
-    /// Passes over `count` bytes; false if the data end before.
+    /// Skips `count` bytes. It returns false if the data end before.
     pub fn skip(&mut self, mut count: u64) -> Result<bool> {
         if let Self::Plain(left) = self {
             let step = usize::try_from(count).unwrap_or(usize::MAX);

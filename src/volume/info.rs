@@ -1,4 +1,4 @@
-//! What the service tells of a volume.
+//! The description of a volume that the service gives.
 
 use super::builtin::{self, Builtin};
 use super::voxels::{Histogram, VoxelType};
@@ -53,17 +53,17 @@ pub struct VolumeInfo {
 }
 
 impl VolumeInfo {
-    /// Of an uploaded volume.
+    /// The description of an uploaded volume.
     pub fn of_upload(id: &str, volume: &Volume) -> Self {
         Self { id: Some(id.to_owned()), ..Self::of(volume, json!({ "id": id })) }
     }
 
-    /// Of a built-in that was built.
+    /// The description of a built-in that was built.
     pub fn of_builtin(name: &str, resolution: usize, seed: u64, volume: &Volume) -> Self {
         Self { builtin: Some(name.to_owned()), ..Self::of(volume, builtin_reference(name, resolution, seed)) }
     }
 
-    /// Of a volume that the service made itself, such as a field; `reference` is how a request names it.
+    /// The description of a volume that the service made itself, such as a field; `reference` names it in a request.
     pub fn of(volume: &Volume, reference: Value) -> Self {
         Self {
             reference,
@@ -87,7 +87,7 @@ impl VolumeInfo {
         }
     }
 
-    /// Of a built-in at its default resolution, without building it.
+    /// The description of a built-in at its default resolution, without building it.
     pub(crate) fn of_unbuilt(builtin: &Builtin) -> Self {
         let n = builtin::DEFAULT_RESOLUTION;
         let step = 2.0 / n as f64;
@@ -115,7 +115,7 @@ impl VolumeInfo {
         }
     }
 
-    /// The same without its histogram, for lists.
+    /// The description without its histogram, for lists.
     pub(crate) fn brief(mut self) -> Self {
         self.histogram = None;
         self

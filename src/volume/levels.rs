@@ -1,8 +1,8 @@
 //! Coarser levels of a volume, as of a mip map: level k has voxels 2ᵏ times as wide as the smallest side of the volume's own.
 //!
-//! A voxel of a level is the mean of what its box covers of the volume's, each by the part of it that is inside (area averaging); one that
-//! has no value does not count. Axes whose voxels are as wide already stay as they are. The box is the same, whatever the sizes, and so are
-//! range and histogram: colours that are chosen by them stay where they are.
+//! A voxel of a level is the mean of the volume's voxels that its box covers, each weighted by the part of it that is inside (area
+//! averaging). A voxel without a value does not count. Axes whose voxels are as wide already stay as they are. The box is the same at all
+//! levels, and so are range and histogram, so that colours that depend on them do not change.
 
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
@@ -16,18 +16,18 @@ use super::{NewVolume, Volume};
 /// The coarsest level that a request may name.
 pub const MOST_LEVEL: usize = 8;
 
-/// The levels of a volume that were asked for.
+/// The levels of a volume, made as they are asked for.
 pub(super) type Levels = [OnceLock<Arc<Volume>>; MOST_LEVEL];
 
-/// The part of an axis that one voxel of a level covers: the first voxel, and of it and those that follow the parts inside.
+/// The part of an axis that one voxel of a level covers: the first voxel, and the covered parts of it and of those that follow.
 struct Span {
     first: usize,
     parts: Vec<f64>,
 }
 
 impl Volume {
-    /// A coarser level, made when it is first asked for and kept as long as the volume; level 0 is the volume itself, and beyond the
-    /// coarsest there is only that.
+    /// A coarser level, made when it is first asked for and kept as long as the volume. Level 0 is the volume itself; a number beyond the
+    /// coarsest level gives the coarsest.
     pub fn level(self: &Arc<Self>, level: usize) -> Arc<Self> {
         match level.min(MOST_LEVEL).checked_sub(1) {
             None => self.clone(),
@@ -35,11 +35,11 @@ impl Volume {
         }
     }
 
-    /// Voxels along x, y, z of a level.
+    /// The number of voxels along x, y, z of a level.
     fn level_dims(&self, level: usize) -> [usize; 3] {
         let spacing = self.spacing();
         let target = spacing.into_iter().fold(f64::INFINITY, f64::min) * (1u64 << level) as f64;
-        // A hair less, so that what is as wide but for rounding stays.
+        // A little is taken off, so that an axis whose voxels are as wide but for rounding stays.
         [0, 1, 2].map(|a| {
             let needed = (self.dims()[a] as f64 * spacing[a] / target - 1e-6).ceil() as usize;
             needed.clamp(1, self.dims()[a])
@@ -69,7 +69,7 @@ impl Volume {
         Self { bright_mean: OnceLock::from(self.bright_mean()), ..self.derived(parts, world_from_index) }
     }
 
-    /// What a volume that is made of this one has of it: all but its notes and what its file says of its place.
+    /// The parts that a volume made of this one takes over: all but its notes and its place as its file gives it.
     pub(super) fn parts_with(&self, voxels: Voxels) -> NewVolume {
         NewVolume {
             linear: None,
@@ -94,7 +94,7 @@ impl Volume {
         Self { parts, world_from_index, range, non_finite, histogram, bright_mean, levels, words }
     }
 
-    /// Bytes of the volume, of the levels that were made of it, and of all their words.
+    /// The bytes of the volume, of the levels that were made of it, and of all their words.
     pub(crate) fn bytes_in_all(&self) -> u64 {
         let words = self.words.get().and_then(Option::as_ref).map_or(0, |words| words.bytes());
         let levels = self.levels.iter().filter_map(OnceLock::get);
@@ -102,7 +102,7 @@ impl Volume {
     }
 }
 
-/// What each of `to` equal parts of an axis of `from` voxels covers.
+/// The spans of `to` equal parts of an axis of `from` voxels.
 fn spans(from: usize, to: usize) -> Vec<Span> {
     let width = from as f64 / to as f64;
     let span = |i: usize| {

@@ -1,25 +1,25 @@
-//! How large a volume may be, asked before anything is allocated for it.
+//! The limits of a volume's size, checked before anything is allocated for it.
 
 use super::samples::RawType;
 use crate::error::{Error, Result};
 
-/// How large a volume may be.
+/// The limits of a volume's size.
 #[derive(Debug, Clone, Copy)]
 pub struct VolumeLimits {
-    /// Bytes of its voxels once decoded.
+    /// The most bytes of its voxels once decoded.
     pub max_volume_bytes: u64,
-    /// Voxels along its longest side.
+    /// The most voxels along its longest side.
     pub max_side: usize,
 }
 
 impl Default for VolumeLimits {
-    /// 1 GiB, the least that OpenCL devices of today promise for one buffer, and 4096 a side.
+    /// The default limits: 1 GiB, the least that OpenCL devices of today promise for one buffer, and 4096 a side.
     fn default() -> Self {
         Self { max_volume_bytes: 1 << 30, max_side: 4096 }
     }
 }
 
-/// The sizes as dimensions and their product, if they are within the limits: asked before anything is allocated.
+/// The sizes as dimensions and their product, if they are within the limits. This is checked before anything is allocated.
 pub(super) fn checked_count(
     sizes: [u64; 3],
     raw: RawType,

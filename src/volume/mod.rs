@@ -1,11 +1,11 @@
-//! Grids of voxels: what they hold, where they stand, how they are read, built and kept.
+//! Grids of voxels: their values, their place in the world, and the code that reads, builds and keeps them.
 //!
 //! **Index space** is cell-cornered: along an axis of `n` voxels the continuous index `u` runs over `0..n`, voxel `i`
 //! has its centre at `i + 0.5`, and the volume's box is `[0, n]`. [`Volume::world_from_index`] takes that box to the
 //! world with its centre at the origin. World axes of a scan are NIfTI's: x right, y anterior, z superior.
 //!
-//! **Values** are `raw · slope + inter`; voxels stay in the type of their file, so that a byte volume takes a byte a
-//! voxel on the device too; floats are taken as words of 16 bits where a view needs no more (`words.rs`).
+//! **Values** are `raw · slope + inter`. Voxels stay in the type of their file, so that a byte volume takes a byte a voxel on the device
+//! too. Floats are taken as words of 16 bits if a view needs no more (`words.rs`).
 
 mod bright;
 pub mod builtin;
@@ -43,14 +43,14 @@ use std::sync::OnceLock;
 /// Voxel spacings outside of this range are taken for damage; in mm these are a picometre and a thousand kilometres.
 const SPACING_RANGE: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
 
-/// What a reader or a built-in knows of a volume; [`Volume::new`] checks it and derives the rest.
+/// The parts of a volume that a reader or a built-in gives. [`Volume::new`] checks them and derives the rest.
 #[derive(Debug)]
 pub struct NewVolume {
     /// Voxels along x, y, z.
     pub dims: [usize; 3],
-    /// Distance between neighbouring voxels in world units; used only where there is no `linear`.
+    /// Distance between neighbouring voxels in world units; used only without `linear`.
     pub spacing: [f64; 3],
-    /// Columns are the steps from voxel to voxel along x, y, z in world units, if the file says so.
+    /// The matrix whose columns are the steps from voxel to voxel along x, y, z in world units, if the file gives it.
     pub linear: Option<DMat3>,
     /// The voxels, x fastest, then y, then z.
     pub voxels: Voxels,
@@ -60,13 +60,13 @@ pub struct NewVolume {
     pub inter: f64,
     /// A name for people.
     pub name: String,
-    /// Where it came from: `nifti`, `nrrd`, `raw`, `builtin` or `field`.
+    /// The source of the volume: `nifti`, `nrrd`, `raw`, `builtin` or `field`.
     pub format: String,
     /// Row-major map from integer voxel indices to patient space (RAS) in the file's own length unit.
     pub file_affine: Option<[[f64; 4]; 4]>,
-    /// The world's length unit: `mm`, or `unit` for what has no physical size.
+    /// The world's length unit: `mm`, or `unit` for a volume without a physical size.
     pub unit: String,
-    /// What was lost or assumed while reading, in words for the sender.
+    /// The losses and assumptions of reading, in words for the sender.
     pub notes: Vec<String>,
 }
 
@@ -87,7 +87,7 @@ impl Volume {
     /// Checks the parts and computes range and histogram. Infinite voxels become NaN.
     ///
     /// # Errors
-    /// [`Error::Invalid`] where spacing, axes or scaling make no sense; [`Error::Internal`] if voxels do not fit `dims`.
+    /// [`Error::Invalid`] if spacing, axes or scaling make no sense; [`Error::Internal`] if voxels do not fit `dims`.
     pub fn new(mut parts: NewVolume) -> Result<Self> {
         let count = parts.dims.iter().try_fold(1usize, |product, &n| product.checked_mul(n));
         if count != Some(parts.voxels.len()) || parts.voxels.is_empty() {
@@ -128,7 +128,7 @@ impl Volume {
         self.parts.spacing
     }
 
-    /// The smallest of them.
+    /// The smallest of these distances.
     pub fn smallest_side(&self) -> f64 {
         self.spacing().into_iter().fold(f64::INFINITY, f64::min)
     }
@@ -158,7 +158,7 @@ impl Volume {
         self.parts.inter
     }
 
-    /// The value of voxel (x, y, z), scaled; NaN where there is none, or outside of the grid.
+    /// The value of voxel (x, y, z), scaled; NaN if it has none, or outside of the grid.
     pub fn value(&self, x: usize, y: usize, z: usize) -> f64 {
         let [nx, ny, nz] = self.parts.dims;
         if x >= nx || y >= ny || z >= nz {
@@ -185,22 +185,22 @@ impl Volume {
         linear.x_axis.abs() * half.x + linear.y_axis.abs() * half.y + linear.z_axis.abs() * half.z
     }
 
-    /// Least and greatest value, scaled; both 0 where no voxel is finite.
+    /// The least and the greatest value, scaled; both are 0 if no voxel is finite.
     pub fn range(&self) -> [f64; 2] {
         self.range
     }
 
-    /// Voxels that are NaN, or were infinite in the file. Nothing is rendered where they are.
+    /// The number of voxels that are NaN, or were infinite in the file. Nothing is rendered in these voxels.
     pub fn non_finite(&self) -> u64 {
         self.non_finite
     }
 
-    /// How many voxels have which value.
+    /// The histogram of the values.
     pub fn histogram(&self) -> &Histogram {
         &self.histogram
     }
 
-    /// The mean of the finite voxels along a bright ray: what one in fifty of the rays along the grid's axes stays above.
+    /// The mean of the finite voxels along a bright ray: one in fifty of the rays along the grid's axes is brighter.
     pub fn bright_mean(&self) -> f64 {
         *self.bright_mean.get_or_init(|| bright::bright_mean(self))
     }
@@ -210,7 +210,7 @@ impl Volume {
         &self.parts.name
     }
 
-    /// Where it came from: `nifti`, `nrrd`, `raw`, `builtin` or `field`.
+    /// The source of the volume: `nifti`, `nrrd`, `raw`, `builtin` or `field`.
     pub fn format(&self) -> &str {
         &self.parts.format
     }
@@ -225,7 +225,7 @@ impl Volume {
         &self.parts.unit
     }
 
-    /// What was lost or assumed while reading.
+    /// The losses and assumptions of reading.
     pub fn notes(&self) -> &[String] {
         &self.parts.notes
     }
@@ -238,7 +238,7 @@ pub(crate) fn checked_axes(linear: DMat3, pointer: &str) -> Result<[f64; 3]> {
         let detail = format!("the steps from voxel to voxel have the lengths {lengths:?}");
         return Err(Error::invalid(pointer, detail, "finite, 1e-9 to 1e9"));
     }
-    // The volume spanned by the unit axes: 1 for a right-angled grid, 0 where the axes lie in a plane.
+    // The volume spanned by the unit axes: 1 for a right-angled grid, 0 if the axes lie in a plane.
     let independence = linear.determinant().abs() / (lengths[0] * lengths[1] * lengths[2]);
     if independence.is_nan() || independence < 1e-6 {
         return Err(Error::invalid(pointer, "the axes of the grid lie in one plane", "three independent axes"));
@@ -246,7 +246,7 @@ pub(crate) fn checked_axes(linear: DMat3, pointer: &str) -> Result<[f64; 3]> {
     Ok(lengths)
 }
 
-/// The scaled range; refused where a value would leave what 32-bit floats on the device can hold.
+/// The scaled range. It is refused if a value would leave the range of 32-bit floats on the device.
 fn physical_range(raw: [f64; 2], slope: f64, inter: f64) -> Result<[f64; 2]> {
     let ends = raw.map(|value| value * slope + inter);
     if ends.iter().any(|end| !(*end as f32).is_finite()) {

@@ -10,13 +10,13 @@ use crate::error::{Error, Result};
 use ::nifti::{Endianness, NiftiHeader};
 use glam::{DMat3, DVec3};
 
-/// Bytes of the header.
+/// The number of bytes of the header.
 pub(super) const HEADER_BYTES: usize = 348;
 
-/// Where the magic stands in it.
+/// The offset of the magic in the header.
 const MAGIC_AT: usize = 344;
 
-/// Header extensions (text, mostly) larger than this are not waited for.
+/// The largest offset of the voxels. Larger header extensions (text, mostly) are not waited for.
 const MAX_OFFSET: f32 = (64 << 20) as f32;
 
 /// The rows of a map from voxel indices to patient space, and the header's field that gives them.
@@ -27,7 +27,7 @@ pub(super) fn is_nifti(bytes: &[u8]) -> bool {
     matches!(bytes.get(MAGIC_AT..HEADER_BYTES), Some(b"n+1\0" | b"ni1\0"))
 }
 
-/// True if the bytes begin with a NIfTI-2 header, which is recognised to be refused by name.
+/// True if the bytes begin with a NIfTI-2 header. It is recognised to be refused by name.
 pub(super) fn is_nifti_2(bytes: &[u8]) -> bool {
     matches!(bytes.get(4..8), Some(b"n+2\0" | b"ni2\0"))
 }
@@ -134,7 +134,7 @@ fn spacing(header: &NiftiHeader, dims: [usize; 3]) -> Result<[f64; 3]> {
     Ok(spacing)
 }
 
-/// Millimetres per unit of the file, and a note where that had to be assumed.
+/// The millimetres per unit of the file, and a note if that had to be assumed.
 fn length_unit(xyzt_units: u8) -> (f64, Option<String>) {
     match xyzt_units & 7 {
         0 | 2 => (1.0, None),
@@ -144,7 +144,7 @@ fn length_unit(xyzt_units: u8) -> (f64, Option<String>) {
     }
 }
 
-/// The map of the sform, else of the qform, else none.
+/// The map of the sform, or else of the qform; `None` without both.
 fn affine(header: &NiftiHeader, spacing: [f64; 3]) -> Result<Option<Affine>> {
     const LAST: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
     let (rows, pointer) = if header.sform_code > 0 {
@@ -166,7 +166,7 @@ fn affine(header: &NiftiHeader, spacing: [f64; 3]) -> Result<Option<Affine>> {
 fn qform(header: &NiftiHeader, spacing: [f64; 3]) -> [[f64; 4]; 4] {
     let imaginary = DVec3::new(header.quatern_b.into(), header.quatern_c.into(), header.quatern_d.into());
     let rest = 1.0 - imaginary.length_squared();
-    // As in the reference: a half turn, whose real part rounding has made slightly negative.
+    // As in the reference, this is a half turn whose real part rounding has made slightly negative.
     let half_turn = rest < 1e-7;
     let a = if half_turn { 0.0 } else { rest.sqrt() };
     let DVec3 { x: b, y: c, z: d } = if half_turn { imaginary.normalize() } else { imaginary };
@@ -189,7 +189,7 @@ pub(super) fn linear_part(rows: [[f64; 4]; 4]) -> DMat3 {
     DMat3::from_cols(column(0), column(1), column(2))
 }
 
-/// Where the voxels begin. 0 stands for "behind the header", as some writers mean it.
+/// The offset of the voxels. 0 stands for "behind the header", as some writers mean it.
 fn data_offset(vox_offset: f32) -> Result<u64> {
     match vox_offset {
         0.0 => Ok(352),
@@ -198,7 +198,7 @@ fn data_offset(vox_offset: f32) -> Result<u64> {
     }
 }
 
-/// A slope of 0 means "not scaled"; what is not finite is taken for that too.
+/// The slope and the intercept. A slope of 0 means "not scaled", and so does one that is not finite.
 fn scaling(slope: f32, inter: f32) -> (f64, f64) {
     if slope == 0.0 || !slope.is_finite() {
         return (1.0, 0.0);

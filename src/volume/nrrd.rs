@@ -8,7 +8,7 @@ use super::{NewVolume, SPACING_RANGE, Volume, checked_axes};
 use crate::error::{Error, Result};
 use glam::{DMat3, DVec3};
 
-/// More decompressed bytes than this are not skipped.
+/// The most decompressed bytes that are skipped.
 const MAX_SKIP: u64 = 64 << 20;
 
 /// Reads the volume from the file's first byte on.
@@ -38,7 +38,7 @@ pub(super) fn read(bytes: &[u8], name: &str, limits: &VolumeLimits) -> Result<Vo
     })
 }
 
-/// The axes of the file: three, or four of which the first or the last has size 1 and is left out.
+/// The axes of the file: three, or four if the first or the last has size 1 and is left out.
 struct Axes {
     sizes: Vec<u64>,
     left_out: Option<usize>,
@@ -70,7 +70,7 @@ impl Axes {
         if axes == 3 {
             return Ok(Self { sizes, left_out: None, directions });
         }
-        // Where both outer axes have size 1, the one without a direction in space is not spatial.
+        // If both outer axes have size 1, the one without a direction in space is not spatial.
         let spatial = |axis: usize| directions.as_ref().is_none_or(|directions| directions[axis].is_some());
         let single = [3, 0].into_iter().filter(|&axis| sizes[axis] == 1);
         let Some(left_out) = single.min_by_key(|&axis| spatial(axis)) else {
@@ -80,14 +80,14 @@ impl Axes {
         Ok(Self { sizes, left_out: Some(left_out), directions })
     }
 
-    /// The values of the three spatial axes out of one an axis.
+    /// The values of the three spatial axes, from one value per axis.
     fn pick<T: Copy>(&self, values: &[T]) -> [T; 3] {
         let first = if self.left_out == Some(0) { 1 } else { 0 };
         [values[first], values[first + 1], values[first + 2]]
     }
 }
 
-/// Voxel distances from `spacings`, 1 where there are none.
+/// Voxel distances from `spacings`, or 1 without them.
 fn spacing(header: &Header, axes: &Axes) -> Result<[f64; 3]> {
     let Some(spacings) = header.per_axis("spacings", axes.sizes.len())? else { return Ok([1.0; 3]) };
     let mut spacing = [1.0; 3];
@@ -113,7 +113,7 @@ fn orientation(header: &Header, axes: &Axes) -> Result<Option<(DMat3, DVec3)>> {
     Ok(Some((linear, ras * DVec3::from_array(origin))))
 }
 
-/// Signs that take the file's space to right, anterior, superior.
+/// The signs that take the file's space to right, anterior, superior.
 fn ras_from_space(header: &Header) -> Result<DVec3> {
     let Some(space) = header.get("space") else { return Ok(DVec3::ONE) };
     match space.to_ascii_lowercase().as_str() {
@@ -134,7 +134,7 @@ fn rows(linear: DMat3, origin: DVec3) -> [[f64; 4]; 4] {
     [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]]
 }
 
-/// Millimetres per unit of the file, and a note where that had to be assumed.
+/// The millimetres per unit of the file, and a note if that had to be assumed.
 fn length_unit(header: &Header, axes: &Axes) -> (f64, Option<String>) {
     // `space units` has one entry a dimension of space, `units` one an axis.
     let (text, per_axis) = match (header.get("space units"), header.get("units")) {
@@ -166,7 +166,7 @@ fn endian(header: &Header, raw: RawType) -> Result<Endian> {
     }
 }
 
-/// The data, after the lines and bytes to be skipped. Of gzip, lines are skipped before inflating and bytes after.
+/// The data, after the lines and bytes to be skipped. In gzip data, lines are skipped before inflating and bytes after.
 fn data<'a>(header: &Header, bytes: &'a [u8], announced: u64) -> Result<Source<'a>> {
     let mut rest = bytes.get(header.data_at..).unwrap_or_default();
     for _ in 0..header.integer("line skip", 0)?.max(0) {
@@ -185,7 +185,7 @@ fn data<'a>(header: &Header, bytes: &'a [u8], announced: u64) -> Result<Source<'
         }
     };
     if skip == -1 && !compressed {
-        // The data are what stands last in the file.
+        // The data are the last bytes of the file.
         let start = usize::try_from(announced).ok().and_then(|announced| rest.len().checked_sub(announced));
         return Ok(Source::plain(start.and_then(|start| rest.get(start..)).unwrap_or(rest)));
     }

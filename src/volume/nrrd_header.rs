@@ -4,13 +4,13 @@ use super::samples::RawType;
 use crate::error::{Error, Result};
 use std::collections::HashMap;
 
-/// Headers are text that people write; a larger one is damage.
+/// The most bytes of a header. Headers are text that people write; a larger one is damage.
 const MAX_HEADER: usize = 1 << 20;
 
 /// The fields of a header.
 pub(super) struct Header {
     fields: HashMap<String, String>,
-    /// Where the data begin.
+    /// The offset of the data.
     pub data_at: usize,
 }
 
@@ -139,7 +139,7 @@ fn exactly<T>(name: &str, values: Vec<T>, axes: usize) -> Result<Vec<T>> {
     Err(Error::invalid(format!("header:{name}"), detail, format!("{axes}, as dimension says")))
 }
 
-/// `(1, 0, 0)`.
+/// Parses a vector such as `(1, 0, 0)`.
 pub(super) fn vector(name: &str, text: &str) -> Result<[f64; 3]> {
     let inner = text.trim().strip_prefix('(').and_then(|text| text.strip_suffix(')')).unwrap_or_default();
     let numbers: Option<Vec<f64>> = inner.split(',').map(|part| part.trim().parse().ok()).collect();

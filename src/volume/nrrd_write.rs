@@ -1,10 +1,10 @@
-//! A volume as NRRD (attached, raw encoding): what `GET …/field` gives.
+//! The encoding of a volume as NRRD (attached, raw), the reply of `GET …/field`.
 
 use super::{Volume, Voxels};
 use glam::DVec3;
 
-/// The NRRD bytes of a volume: its voxels in their own type, little-endian, with the axes and the centre of the first voxel
-/// in world units. Slope and intercept, if any, are applied by nobody: they stand in the header as key/value pairs.
+/// The NRRD bytes of a volume: its voxels in their own type, little-endian, with the axes and the centre of the first voxel in world units.
+/// Slope and intercept, if any, are not applied; they stand in the header as key/value pairs.
 pub fn write_nrrd(volume: &Volume) -> Vec<u8> {
     let [nx, ny, nz] = volume.dims();
     let kind = match volume.voxels() {

@@ -1,4 +1,4 @@
-//! Work over ranges on the machine's cores. Results do not depend on how many there are.
+//! Work over ranges on the machine's cores. Results do not depend on the number of cores.
 
 use std::num::NonZero;
 use std::ops::Range;
@@ -7,7 +7,7 @@ use std::thread;
 /// Below this many voxels a thread costs more than it saves (a start takes about 20 µs).
 const WORTH_A_THREAD: usize = 1 << 18;
 
-/// Volumes are read beside a running device: more threads than this would only take its cores.
+/// The most threads. Volumes are read beside a running device, and more threads would only take its cores.
 const MAX_THREADS: usize = 8;
 
 fn threads_for(voxels: usize) -> usize {

@@ -3,7 +3,7 @@
 use super::parallel;
 use super::voxels::{Sample, Voxels, with_slice};
 
-/// Least and greatest raw value, if any is a number.
+/// The least and the greatest raw value, if any is a number.
 pub(super) fn raw_range(voxels: &Voxels) -> Option<[f64; 2]> {
     let [low, high] = with_slice!(voxels, min_max);
     (low <= high).then_some([low, high])

@@ -35,7 +35,7 @@ pub struct RawParams {
 }
 
 impl RawQuery {
-    /// The parameters, `None` if none is given.
+    /// The parameters; `None` if none is given.
     ///
     /// # Errors
     /// [`Error::Invalid`] with a violation for each parameter that is missing or wrong.

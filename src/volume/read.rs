@@ -1,4 +1,4 @@
-//! Which format a body has, and the limits that all formats share.
+//! The recognition of a body's format, and the limits that all formats share.
 
 use super::inflate::{Source, is_gzip};
 use super::limits::VolumeLimits;
@@ -10,11 +10,11 @@ use crate::error::{Error, Result};
 pub const FORMATS: &str = "NIfTI-1 (.nii, .nii.gz), NRRD with its data attached (.nrrd; raw or gzip), \
     or raw voxels with ?dims=NX,NY,NZ&type=u8&spacing=1,1,1";
 
-/// Names are for people; what is longer is cut.
+/// The longest name, in characters. Names are for people, and longer ones are cut.
 const MAX_NAME: usize = 120;
 
-/// Reads a volume. With `raw` the body is taken for bare voxels, whatever it looks like; otherwise its content says
-/// what it is (its name does not matter).
+/// Reads a volume. With `raw` the body is taken for bare voxels, whatever it looks like; otherwise its content tells its format (its name
+/// does not matter).
 ///
 /// # Errors
 /// [`Error::UnsupportedMediaType`] for an unknown format, [`Error::TooLarge`] above the limits, and [`Error::Invalid`]

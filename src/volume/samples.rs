@@ -1,4 +1,4 @@
-//! From bytes of a file to voxels: every scalar type in both byte orders.
+//! The conversion of a file's bytes to voxels, from every scalar type in both byte orders.
 
 use super::inflate::Source;
 use super::voxels::{VoxelType, Voxels};
@@ -56,7 +56,7 @@ impl RawType {
         ("f64", Self::F64),
     ];
 
-    /// Bytes of one voxel in the file.
+    /// The bytes of one voxel in the file.
     pub fn bytes(self) -> usize {
         match self {
             Self::U8 | Self::I8 => 1,
@@ -77,10 +77,9 @@ impl RawType {
     }
 }
 
-/// Reads exactly `count` voxels, which must be all that is left, and a note if values were rounded.
+/// Reads exactly `count` voxels, which must be all that is left, and returns a note if values were rounded.
 ///
-/// Memory grows with the data that arrive, not with what the header announces. `pointer` names the header's field that
-/// announced `count`.
+/// Memory grows with the data that arrive, not with the number in the header. `pointer` names the header's field that announced `count`.
 pub(super) fn decode(
     source: &mut Source<'_>,
     raw: RawType,
@@ -132,7 +131,7 @@ pub(super) fn decode(
     Ok((voxels, note))
 }
 
-/// Refuses, before any memory is taken, what cannot be: the body's length bounds what it can hold.
+/// Refuses an impossible number of voxels before any memory is taken. The body's length bounds the number.
 fn check_length(source: &Source<'_>, raw: RawType, count: usize, pointer: &str) -> Result<()> {
     let announced = (count as u64).saturating_mul(raw.bytes() as u64);
     let held = source.at_most();
@@ -161,7 +160,7 @@ impl Reader<'_, '_> {
     fn collect<const N: usize, T>(&mut self, mut convert: impl FnMut([u8; N]) -> T) -> Result<Vec<T>> {
         let announced = (self.count as u64).saturating_mul(N as u64);
         let mut values = Vec::with_capacity(self.count.min(self.source.about() / N));
-        // A multiple of every type's size, and small enough to stay in the cache between inflating and converting.
+        // The size is a multiple of every type's size, and small enough to stay in the cache between inflating and converting.
         let mut buffer = vec![0u8; 1 << 16];
         while values.len() < self.count {
             let want = (self.count - values.len()).saturating_mul(N).min(buffer.len());

@@ -1,4 +1,4 @@
-//! Voxels in the type of their file, and how often which value occurs.
+//! Voxels in the type of their file, and the histogram of their values.
 
 use super::parallel;
 
@@ -17,10 +17,10 @@ pub enum VoxelType {
 }
 
 impl VoxelType {
-    /// Every type: kernels are built for each.
+    /// Every type. Kernels are built for each.
     pub const ALL: [Self; 4] = [Self::U8, Self::I16, Self::U16, Self::F32];
 
-    /// Bytes of one voxel.
+    /// The bytes of one voxel.
     pub fn bytes(self) -> usize {
         match self {
             Self::U8 => 1,
@@ -57,7 +57,7 @@ macro_rules! with_slice {
 pub(super) use with_slice;
 
 impl Voxels {
-    /// How many voxels there are.
+    /// The number of voxels.
     pub fn len(&self) -> usize {
         match self {
             Self::U8(v) => v.len(),
@@ -67,7 +67,7 @@ impl Voxels {
         }
     }
 
-    /// True if there are none.
+    /// True if there are no voxels.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -82,7 +82,7 @@ impl Voxels {
         }
     }
 
-    /// All voxels as they lie in memory (native byte order): what the device gets.
+    /// All voxels as they lie in memory (native byte order). The device gets these bytes.
     pub fn as_bytes(&self) -> &[u8] {
         match self {
             Self::U8(v) => v,
@@ -119,11 +119,11 @@ impl Voxels {
 
 /// A voxel's type as the statistics see it. Comparisons with NaN are false, so NaN never becomes a minimum or maximum.
 pub(super) trait Sample: Copy + PartialOrd + Send + Sync {
-    /// Where a search for the minimum starts.
+    /// The start value of a search for the minimum.
     const HIGHEST: Self;
-    /// Where a search for the maximum starts.
+    /// The start value of a search for the maximum.
     const LOWEST: Self;
-    /// The value, exactly.
+    /// The value, without rounding.
     fn to_f64(self) -> f64;
 }
 
@@ -155,10 +155,10 @@ pub struct Histogram {
 }
 
 impl Histogram {
-    /// Bins of a histogram: one a grey level for bytes.
+    /// The number of bins of a histogram: one a grey level for bytes.
     pub const BINS: usize = 256;
 
-    /// Counts the scaled values over `range`. Where the range is a point, all are in the first bin.
+    /// Counts the scaled values over `range`. If the range is a point, all are in the first bin.
     pub(super) fn new(voxels: &Voxels, slope: f64, inter: f64, range: [f64; 2]) -> Self {
         let [min, max] = range;
         // bin = (raw · slope + inter − min) · BINS / (max − min), with the constants multiplied out.
@@ -168,7 +168,8 @@ impl Histogram {
     }
 }
 
-/// Runs of equal voxels would make each count wait for the one before it: neighbours count into tables of their own.
+/// The number of tables. Neighbours count into tables of their own, since in runs of equal voxels each count would wait for the one before
+/// it.
 const TABLES: usize = 4;
 
 fn count_bins<T: Sample>(voxels: &[T], scale: f64, offset: f64) -> Vec<u64> {

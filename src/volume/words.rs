@@ -1,22 +1,22 @@
-//! A volume of floats in whole numbers of 16 bits: half the memory, and kernels weigh them twice as fast.
+//! A volume of floats in whole numbers of 16 bits. It takes half the memory, and kernels weigh the words twice as fast.
 //!
-//! Word w stands for low + w (high − low) / 65535, so a value is off by half a step, (high − low) / 131070, at most, and so is what
-//! lies between values. Statistics are the volume's own.
+//! Word w stands for low + w (high − low) / 65535, so that a value is off by half a step, (high − low) / 131070, at most, and so are values
+//! between voxels. Statistics are the volume's own.
 
 use std::sync::{Arc, OnceLock};
 
 use super::parallel::over_slices;
 use super::{NewVolume, Volume, Voxels};
 
-/// Steps of the words over the range.
+/// The number of steps of the words over the range.
 const STEPS: f64 = 65535.0;
 
-/// The volume in words once it was asked for; none where it has none.
+/// The volume in words once it was asked for; `None` in it if the volume has no words.
 pub(super) type Words = OnceLock<Option<Arc<Volume>>>;
 
 impl Volume {
-    /// The volume in words, where it has floats, all of them finite, and words whose steps are at most `resolution`, a difference of
-    /// values. Made when it is first asked for and kept as long as the volume.
+    /// The volume in words, if it has floats, all of them finite, and words whose steps are at most `resolution`, a difference of values.
+    /// It is made when it is first asked for and kept as long as the volume.
     pub fn words(&self, resolution: f64) -> Option<Arc<Self>> {
         let Voxels::F32(values) = self.voxels() else { return None };
         let [low, high] = self.range;
@@ -40,7 +40,7 @@ impl Volume {
         let mut words = vec![0u16; values.len()];
         over_slices(&mut words, slice, |z, words| {
             for (word, value) in words.iter_mut().zip(&values[z * slice..]) {
-                // The cast saturates: what rounding takes past an end is the end.
+                // The cast saturates, so that a value that rounding takes past an end becomes the end.
                 *word = ((value - first) * scale + 0.5) as u16;
             }
         });

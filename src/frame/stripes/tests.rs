@@ -1,15 +1,15 @@
-//! Stripes against a decoder that is not ours.
+//! Tests of stripes with a decoder that is not ours.
 
 use super::*;
 use crate::frame::{png, read_description};
 
-/// What a picture is made of.
+/// A byte of a picture, by its place in a row and its row.
 type Pixel = fn(usize, usize) -> u8;
 
 const FLAT: Pixel = |_, _| 0;
 const SMOOTH: Pixel = |i, row| ((i / 7 + 3 * row) / 5) as u8;
 const NOISY: Pixel = |i, row| ((i + 7919 * row).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 51) as u8;
-/// Mostly empty, with few values: streams of all lengths modulo a byte.
+/// A mostly empty picture with few values: its streams have all lengths modulo a byte.
 const SPARSE: Pixel = |i, row| if NOISY(i, row) < 16 { NOISY(row, i) % 5 } else { 0 };
 
 fn picture([width, height]: [usize; 2], channels: usize, pixel: Pixel) -> Vec<u8> {
@@ -17,7 +17,7 @@ fn picture([width, height]: [usize; 2], channels: usize, pixel: Pixel) -> Vec<u8
     (0..row * height).map(|i| pixel(i % row, i / row)).collect()
 }
 
-/// Pixels of a PNG; the checksums of its chunks and of its stream are compared.
+/// The pixels of a PNG. The checksums of its chunks and of its stream are compared.
 fn decode(bytes: &[u8]) -> Result<Vec<u8>> {
     let malformed = |e: png::DecodingError| Error::Malformed(e.to_string());
     let mut options = png::DecodeOptions::default();
@@ -60,7 +60,7 @@ fn every_size_comes_back_as_it_was() -> Result<()> {
 
 #[test]
 fn streams_of_every_length_are_joined() -> Result<()> {
-    // Two stripes, the first with another number of bits each time.
+    // There are two stripes, the first with another number of bits each time.
     for marks in 0..64 {
         let mut before = vec![0; 3 * 4096 * 4];
         before.iter_mut().step_by(11).take(marks).enumerate().for_each(|(i, byte)| *byte = 1 + (i % 3) as u8);

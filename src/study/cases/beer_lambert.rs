@@ -1,4 +1,4 @@
-//! What gets through a box of one medium, at an angle: exp(−σ · length) (P19).
+//! The transmittance of a box of one medium, at an angle: exp(−σ · length) (P19).
 
 use glam::dvec3;
 use serde_json::{Value, json};
@@ -8,7 +8,7 @@ use crate::study::bench::{Bench, Reads};
 use crate::study::oracle::{Eye, inside};
 use crate::study::{Case, Scale, Setting, Trial, Truth, view};
 
-/// The case's line.
+/// The case's entry in the list.
 pub const CASE: Case = Case {
     name: "beer_lambert",
     title: "What gets through a box of one medium",

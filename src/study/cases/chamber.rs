@@ -1,4 +1,4 @@
-//! The lecture's chamber: where the photons of a lamp in a foggy room end, by every tracker.
+//! The lecture's chamber: the places where the photons of a lamp in a foggy room end, by every tracker.
 
 use glam::{DVec3, dvec3};
 use serde_json::json;
@@ -10,7 +10,7 @@ use crate::study::{Case, Scale, Setting, Trial, Truth, simulation};
 use crate::technique::photon_transport::FRACTIONS;
 use crate::volume::builtin::chamber_value;
 
-/// The case's line.
+/// The case's entry in the list.
 pub const CASE: Case = Case {
     name: "chamber",
     title: "Where the photons of the chamber end, by every tracker",
@@ -19,7 +19,7 @@ pub const CASE: Case = Case {
     trial,
 };
 
-/// The six faces, and what is absorbed.
+/// The fractions at the six faces, and the absorbed fraction.
 const NAMES: &[&str] = FRACTIONS.split_at(7).0;
 const ALBEDO: f64 = 0.9;
 const GRID: usize = 32;

@@ -9,7 +9,7 @@ use crate::study::bench::{Bench, Reads};
 use crate::study::oracle::{Eye, Grid, Light, Medium, means};
 use crate::study::{Case, Scale, Setting, Trial, Truth, view};
 
-/// The case's line.
+/// The case's entry in the list.
 pub const CASE: Case = Case {
     name: "cloud",
     title: "A cloud under a sun and a sky, by every tracker",
@@ -22,7 +22,7 @@ const SIGMA: f64 = 12.0;
 const ALBEDO: f64 = 0.95;
 const G: f64 = 0.6;
 const SIDE: usize = 64;
-/// Pixels a side of what is compared: the host has means of blocks.
+/// The pixels a side of a compared block. The host has means of blocks.
 const BLOCK: usize = 8;
 const RESOLUTION: usize = 32;
 
@@ -72,7 +72,7 @@ fn trial(bench: &Bench, scale: Scale) -> Result<std::result::Result<Trial, Strin
     Ok(Ok(Trial { truth, settings }))
 }
 
-/// The means of the blocks, and how well they are known.
+/// The means of the blocks, and their relative standard error.
 fn truth(bench: &Bench, eye: Eye, light: &Light, paths: usize) -> Result<(Vec<f64>, f64)> {
     let density = Grid::of_volume(&*bench.assets().builtin("smoke", RESOLUTION, 0)?);
     let medium = Medium { extinction: density.scaled(SIGMA), albedo: ALBEDO, g: G };

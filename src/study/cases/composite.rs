@@ -11,7 +11,7 @@ use crate::study::bench::Bench;
 use crate::study::oracle::{Eye, Grid, inside};
 use crate::study::{Case, Scale, Setting, Trial, Truth, view};
 
-/// The case's line.
+/// The case's entry in the list.
 pub const CASE: Case = Case {
     name: "composite",
     title: "The composite of an MRI head, by step and by what is known of a step",
@@ -21,7 +21,7 @@ pub const CASE: Case = Case {
 };
 
 const SIDE: usize = 96;
-/// Value, red, green, blue, opacity per mm: skin, brain, and what is bright in between.
+/// The points as value, red, green, blue, opacity per mm: skin, brain, and bright tissue in between.
 const POINTS: [[f64; 5]; 5] = [
     [20.0, 0.8, 0.5, 0.4, 0.0],
     [60.0, 0.9, 0.6, 0.4, 0.03],
@@ -29,10 +29,10 @@ const POINTS: [[f64; 5]; 5] = [
     [130.0, 1.0, 0.9, 0.8, 0.3],
     [255.0, 1.0, 1.0, 1.0, 1.0],
 ];
-/// Of the reference.
+/// The steps per voxel of the reference.
 const STEPS_PER_VOXEL: f64 = 64.0;
 
-/// The MRI head of Debian's `mricron-data`, or what CLOUDCHAMBER_TEST_MRI names.
+/// The MRI head of Debian's `mricron-data`, or the file that CLOUDCHAMBER_TEST_MRI names.
 fn file() -> PathBuf {
     std::env::var_os("CLOUDCHAMBER_TEST_MRI")
         .map_or_else(|| "/usr/share/mricron/templates/ch2.nii.gz".into(), Into::into)
@@ -77,7 +77,7 @@ fn trial(bench: &Bench, scale: Scale) -> Result<std::result::Result<Trial, Strin
     Ok(Ok(Trial { truth, settings }))
 }
 
-/// Luminance and opacity per mm of a value: linear between the points.
+/// The luminance and the opacity per mm of a value, linear between the points.
 fn classified(value: f64) -> [f64; 2] {
     let at = POINTS.iter().position(|p| p[0] > value);
     let row = match at {

@@ -8,7 +8,7 @@ use crate::study::bench::Bench;
 use crate::study::oracle::{Eye, inside};
 use crate::study::{Case, Scale, Setting, Trial, Truth, view};
 
-/// The mean's line.
+/// The mean's entry in the list.
 pub const MEAN: Case = Case {
     name: "ellipsoid_mean",
     title: "The mean along rays through an ellipsoid",
@@ -16,7 +16,7 @@ pub const MEAN: Case = Case {
     choose: "`nearest` or trilinear alike: the edge is what is wrong, and only smaller voxels help",
     trial: |b, s| trial(b, s, "mean"),
 };
-/// The X-ray's line.
+/// The X-ray's entry in the list.
 pub const XRAY: Case = Case {
     name: "ellipsoid_xray",
     title: "An X-ray of an ellipsoid",
@@ -28,7 +28,7 @@ pub const XRAY: Case = Case {
 const AXES: DVec3 = dvec3(0.7, 0.5, 0.85);
 const SIGMA: f64 = 1.5;
 const SIDE: usize = 96;
-/// Points along a side of a voxel that its value is the mean of.
+/// The number of points along a side of a voxel. The voxel's value is the mean of its points.
 const SUB_VOXELS: usize = 4;
 
 /// The length of a ray inside of the ellipsoid.
@@ -70,7 +70,7 @@ fn trial(bench: &Bench, scale: Scale, mode: &str) -> Result<std::result::Result<
     Ok(Ok(Trial { truth, settings }))
 }
 
-/// The ellipsoid in `n`³ voxels, each the part of it that is inside.
+/// The ellipsoid in `n`³ voxels, each with the part of it that is inside.
 fn phantom(bench: &Bench, n: usize) -> Result<Value> {
     let voxel = 2.0 / n as f64;
     let sub = |i: usize| ((i as f64 + 0.5) / SUB_VOXELS as f64 - 0.5) * voxel;

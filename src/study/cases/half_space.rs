@@ -1,4 +1,4 @@
-//! What a half-space of albedo 0.9 reflects (P8), by photons from the light and by paths from the eye.
+//! The reflectance of a half-space of albedo 0.9 (P8), by photons from the light and by paths from the eye.
 
 use serde_json::json;
 
@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::study::bench::{Bench, Reads};
 use crate::study::{Case, Scale, Setting, Trial, Truth, simulation, view};
 
-/// The case's line.
+/// The case's entry in the list.
 pub const CASE: Case = Case {
     name: "half_space",
     title: "What a half-space reflects, by photons and by paths",
@@ -17,7 +17,7 @@ pub const CASE: Case = Case {
 
 const ALBEDO: f64 = 0.9;
 const REFLECTED: f64 = 0.414_947;
-/// 800 mean free paths a side stand for a half-space of paths.
+/// For paths, a box of 800 mean free paths a side stands for a half-space.
 const DENSE: f64 = 400.0;
 
 fn trial(_: &Bench, scale: Scale) -> Result<std::result::Result<Trial, String>> {
@@ -30,7 +30,7 @@ fn trial(_: &Bench, scale: Scale) -> Result<std::result::Result<Trial, String>> 
         let reads = Reads::Ledger(&["exit_minus_z"]);
         settings.push(Setting::random("photon_transport", "photons", photons, request).reading(reads));
     }
-    // By reciprocity what is seen at right angles under a sky of radiance 1 is what light at right angles is reflected by.
+    // By reciprocity, the radiance at right angles under a sky of radiance 1 is the reflectance for light at right angles.
     let camera = json!({"eye": [0, 0, 6], "up": [0, 1, 0], "fov_y_deg": 0.2, "projection": "orthographic"});
     let volume = json!({"builtin": "constant", "resolution": 8});
     for (line, scatterings) in [("volume_path", None), ("volume_path, at most 4 scatterings", Some(4))] {

@@ -8,7 +8,7 @@ use crate::study::bench::Bench;
 use crate::study::oracle::Eye;
 use crate::study::{Case, Scale, Setting, Trial, Truth, view};
 
-/// A sphere's line.
+/// The sphere's entry in the list.
 pub const SPHERE: Case = Case {
     name: "isosurface_sphere",
     title: "The lit surface of a sphere, by interpolation and resolution",
@@ -16,7 +16,7 @@ pub const SPHERE: Case = Case {
     choose: "trilinear with central differences; more voxels before a better filter",
     trial: sphere,
 };
-/// The test signal's line.
+/// The test signal's entry in the list.
 pub const MARSCHNER_LOBB: Case = Case {
     name: "isosurface_marschner_lobb",
     title: "The lit surface of Marschner and Lobb's test signal, by interpolation and resolution",
@@ -28,7 +28,7 @@ pub const MARSCHNER_LOBB: Case = Case {
 const SIDE: usize = 128;
 
 fn sphere(bench: &Bench, scale: Scale) -> Result<std::result::Result<Trial, String>> {
-    // Values fall from the centre, with all derivatives: e^(−r²).
+    // Values and all derivatives fall from the centre: e^(−r²).
     let eye = Eye { eye: dvec3(0.0, 0.0, 4.0), wide: 0.9 };
     let value = |p: DVec3| (-p.length_squared()).exp();
     let truth = picture(eye, value, |p| -2.0 * p * value(p), (-0.36f64).exp());

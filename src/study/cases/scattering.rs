@@ -1,4 +1,4 @@
-//! Light scattered once against the whole path, in slabs of rising optical depth: where the one stops being enough.
+//! Light scattered once against the whole path, in slabs of rising optical depth, up to depths at which light scattered once is not enough.
 
 use glam::dvec3;
 use serde_json::{Value, json};
@@ -9,7 +9,7 @@ use crate::study::oracle::Eye;
 use crate::study::{Case, Scale, Setting, Trial, Truth, view};
 use crate::technique::slab::reflected;
 
-/// A thin slab's line.
+/// The thin slab's entry in the list.
 pub const THIN: Case = Case {
     name: "scattering_thin",
     title: "Light scattered once or often in a slab of optical depth 0.1",
@@ -17,7 +17,7 @@ pub const THIN: Case = Case {
     choose: "`single_scatter` if 15 % too dark will do; two scatterings are within 2 %",
     trial: |b, s| trial(b, s, 0.1),
 };
-/// A slab's of a mean free path.
+/// The entry in the list of a slab of one mean free path.
 pub const MEDIUM: Case = Case {
     name: "scattering_medium",
     title: "Light scattered once or often in a slab of optical depth 1",
@@ -25,7 +25,7 @@ pub const MEDIUM: Case = Case {
     choose: "`volume_path`: light scattered once is half of it",
     trial: |b, s| trial(b, s, 1.0),
 };
-/// A thick slab's line.
+/// The thick slab's entry in the list.
 pub const THICK: Case = Case {
     name: "scattering_thick",
     title: "Light scattered once or often in a slab of optical depth 10",
@@ -35,10 +35,10 @@ pub const THICK: Case = Case {
 };
 
 const ALBEDO: f64 = 0.9;
-/// A slab has no sides: those of this one are so many times its thickness away.
+/// A slab has no sides; those of this one are this many times its thickness away.
 const WIDE: f64 = 2000.0;
 
-/// What goes under `volume`: an even slab of thickness 1 around the origin, wide in x and y.
+/// The value of a request's `volume`: an even slab of thickness 1 around the origin, wide in x and y.
 pub fn slab(bench: &Bench) -> Result<Value> {
     bench.floats([1, 1, 1], [WIDE, WIDE, 1.0], |_| 1.0)
 }

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::study::bench::{Bench, Reads};
 use crate::study::{Case, Scale, Setting, Trial, Truth, simulation};
 
-/// The case's line.
+/// The case's entry in the list.
 pub const CASE: Case = Case {
     name: "slab",
     title: "Photons through a slab that scatters forward, by every tracker",

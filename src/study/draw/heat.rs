@@ -1,4 +1,4 @@
-//! A map of what a method is wrong by over two parameters.
+//! A map of a method's error over two parameters.
 
 use plotters::prelude::*;
 
@@ -9,7 +9,7 @@ use crate::study::verdict::{HeatMap, Sample, Verdict};
 const SIZE: (u32, u32) = (760, 460);
 /// The frame of a cell whose reply warns.
 const WARNS: RGBColor = RGBColor(0, 60, 200);
-/// Errors from here on are so dark that words on them are white.
+/// The least error whose cell is so dark that words on it are white.
 const DARK: f64 = 0.3;
 
 /// The heat map: a cell's colour and number are the error relative to the truth; a blue frame is a warning, a black cross silence.
@@ -35,7 +35,7 @@ fn shade(error: Option<f64>) -> RGBColor {
     if part <= 0.0 { RGBColor(250, 250, 245) } else { RGBColor(c.r, c.g, c.b) }
 }
 
-/// An error as it stands in its cell.
+/// The words for an error in its cell.
 fn words(error: Option<f64>) -> String {
     match error {
         None => "—".into(),

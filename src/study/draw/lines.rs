@@ -1,4 +1,4 @@
-//! A study: what each setting is wrong by against the time that it takes.
+//! The chart of a study: each setting's error against its time.
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -8,7 +8,7 @@ use crate::chart::{bounds, plain};
 use crate::error::{Error, Result};
 use crate::study::record::{Line, Point, Record};
 
-/// Relative errors below this are drawn here: a logarithmic axis has no 0.
+/// Relative errors below this are drawn here, since a logarithmic axis has no 0.
 const LEAST_ERROR: f64 = 1e-7;
 const SIZE: (u32, u32) = (1000, 520);
 const CHART_WIDTH: u32 = 620;
@@ -16,8 +16,8 @@ const CHART_WIDTH: u32 = 620;
 type Drawn = std::result::Result<(), Box<dyn std::error::Error>>;
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-/// The chart of a study: log error against log time, a line a technique, a point a setting, a ring around those that no other setting
-/// beats, and in words the slopes.
+/// The chart of a study: log error against log time, a line a technique and a point a setting. A ring marks the settings that no other
+/// setting beats. The slopes are given in words.
 ///
 /// # Errors
 /// [`Error::Internal`] when drawing fails.
@@ -82,7 +82,7 @@ fn marker<'a, C: Clone + 'static>(line: usize, at: C) -> DynElement<'static, SVG
     }
 }
 
-/// What an entry of the legend says: the line's name, what its points differ by, and its slopes.
+/// The words of a legend entry: the line's name, the range of its parameter, and its slopes.
 fn words(line: &Line) -> [String; 2] {
     let ends = match line.points.as_slice() {
         [] => String::new(),

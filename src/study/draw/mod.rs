@@ -10,7 +10,7 @@ pub use sweep::sweep;
 
 use plotters::style::RGBColor;
 
-/// Colours that are told apart by all eyes (Okabe & Ito, 2008), and dark enough on white.
+/// Colours that all eyes tell apart (Okabe & Ito, 2008), and that are dark enough on white.
 const COLORS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),

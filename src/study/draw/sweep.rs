@@ -1,4 +1,4 @@
-//! An experiment's sweeps: what was measured, what is true, and what was predicted.
+//! The chart of an experiment's sweeps: the measured values, the true ones, and the predicted ones.
 
 use plotters::prelude::*;
 
@@ -14,7 +14,7 @@ const WIDE: f64 = 30.0;
 
 type Drawn = std::result::Result<(), Box<dyn std::error::Error>>;
 
-/// The chart of an experiment: points with error bars, the truth in grey, what was predicted dashed, a ring around what is flagged.
+/// The chart of an experiment: points with error bars, the truth in grey, the prediction dashed, and a ring around flagged points.
 ///
 /// # Errors
 /// [`Error::Internal`] when drawing fails.
@@ -40,7 +40,7 @@ fn draw(svg: &mut String, title: &str, findings: &Findings) -> Drawn {
     };
     let mut builder = ChartBuilder::on(&left);
     axis(&mut builder);
-    // The two axes are of different types, what is drawn is the same.
+    // The two axes are of different types; the drawing is the same.
     macro_rules! draw_on {
         ($chart:expr) => {{
             let mut chart = $chart;

@@ -10,7 +10,7 @@ use crate::study::oracle::inside;
 use crate::study::verdict::{Findings, Sweep};
 use crate::study::{Scale, view};
 
-/// The experiment's line.
+/// The experiment's entry in the list.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "cameras",
     title: "Cameras in odd places: 1 oblique, 2 along an axis, 3 within, 4 within along an axis, 5 on a face, 6 on a face outwards, \
@@ -22,10 +22,10 @@ pub const EXPERIMENT: Experiment = Experiment {
 
 const SIGMA: f64 = 0.7;
 const SIDE: usize = 32;
-/// The picture is as wide as this angle: rays that hardly differ.
+/// The angle of the picture, so small that rays hardly differ.
 const FOV_DEG: f64 = 0.1;
 
-/// Where the eye is, and which way it looks.
+/// The positions of the eye, each with its direction of view.
 fn places() -> Vec<[DVec3; 2]> {
     let oblique = dvec3(2.0, 1.3, 3.0);
     vec![

@@ -1,4 +1,4 @@
-//! A box of one medium, and the same said as a grid of equal densities or of equal labels.
+//! A box of one medium, and the same box as a grid of equal densities or of equal labels.
 
 use glam::DVec3;
 use serde_json::json;
@@ -10,7 +10,7 @@ use crate::study::bench::Bench;
 use crate::study::oracle::{Grid, Medium, means};
 use crate::study::verdict::{Findings, Sweep};
 
-/// The experiment's line.
+/// The experiment's entry in the list.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "constant_grid",
     title: "A box of one medium against a constant grid",

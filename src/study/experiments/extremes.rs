@@ -1,4 +1,4 @@
-//! Media and sources at the ends of what is permitted: the energy ledger must close, whatever happens.
+//! Media and sources at the ends of the permitted ranges. The energy ledger must close in every case.
 
 use serde_json::{Value, json};
 
@@ -9,7 +9,7 @@ use crate::study::bench::Bench;
 use crate::study::verdict::{Findings, Sweep};
 use crate::technique::photon_transport::FRACTIONS;
 
-/// The experiment's line.
+/// The experiment's entry in the list.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "extremes",
     title: "The ends of what is permitted: 1 no absorption, 2 no scattering, 3 nothing at all, 4 g = 0.999, 5 g = −0.999, 6 g = 0, \

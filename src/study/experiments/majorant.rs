@@ -1,4 +1,4 @@
-//! A majorant that is not one: delta tracking with M < σ lets e^(−Md) through in place of e^(−σd); weights make up for it.
+//! A majorant that is not one. Delta tracking with M < σ lets e^(−Md) through in place of e^(−σd); weights make up for it.
 
 use serde_json::json;
 
@@ -8,7 +8,7 @@ use crate::study::Scale;
 use crate::study::bench::Bench;
 use crate::study::verdict::{Findings, HeatMap, Sweep};
 
-/// The experiment's line.
+/// The experiment's entry in the list.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "majorant",
     title: "A majorant below or above the extinction",
@@ -17,7 +17,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// Optical depth.
+/// The optical depth.
 const DEPTH: f64 = 2.0;
 
 fn run(bench: &Bench, scale: Scale) -> Result<Findings> {

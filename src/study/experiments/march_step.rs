@@ -1,5 +1,5 @@
-//! The step of a ray march of photons: its free paths are whole steps, so the mean one is h / (1 − e^(−h)) for a step of the optical
-//! depth h; what gets through a slab (P1) is wrong about linearly in it.
+//! The step of a ray march of photons. Its free paths are whole steps, so the mean free path is h / (1 − e^(−h)) for a step of the optical
+//! depth h. The error of a slab's transmittance (P1) is about linear in the step.
 
 use serde_json::json;
 
@@ -9,7 +9,7 @@ use crate::study::Scale;
 use crate::study::bench::Bench;
 use crate::study::verdict::{Findings, Sweep};
 
-/// The experiment's line.
+/// The experiment's entry in the list.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "march_step",
     title: "The step of a photon march",
@@ -18,7 +18,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// P1 (van de Hulst): total transmittance; 10 per mm.
+/// The total transmittance of P1 (van de Hulst), at 10 per mm.
 const TRANSMITTANCE: f64 = 0.660_957_7;
 const EXTINCTION_PER_MM: f64 = 10.0;
 

@@ -1,4 +1,4 @@
-//! Where methods fail: a sweep out of each method's domain. One file each, one line here.
+//! The failures of methods: a sweep out of each method's domain. Each has one file, and one line here.
 
 mod cameras;
 mod constant_grid;
@@ -21,15 +21,15 @@ use crate::error::Result;
 
 /// A sweep out of a method's domain.
 pub struct Experiment {
-    /// Its name: of its file, and in the page.
+    /// Its name, in the name of its file and in the page.
     pub name: &'static str,
-    /// What is done, in a line.
+    /// Its title, a line of words.
     pub title: &'static str,
-    /// The warnings that tell of it: others do not count.
+    /// The codes of the warnings that tell of the failure. Others do not count.
     pub codes: &'static [&'static str],
-    /// What a right implementation shows.
+    /// The result of a right implementation.
     pub expected: &'static str,
-    /// Does it.
+    /// The function that runs it.
     pub run: fn(&Bench, Scale) -> Result<Findings>,
 }
 
@@ -49,7 +49,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
     single_scattering::EXPERIMENT,
 ];
 
-/// What fails elsewhere and is not here yet, with the technique that would have to be there first.
+/// Failures elsewhere that no experiment here shows yet, with the technique that would have to be there first.
 pub const NOT_HERE_YET: &[[&str; 2]] = &[
     ["quadrics from 10⁻³ to 10⁶ across, grazing rays, index 1", "ray tracing of quadrics"],
     ["relaxation of SIRT from 0.5 to 2.5", "reconstruction"],
@@ -58,7 +58,7 @@ pub const NOT_HERE_YET: &[[&str; 2]] = &[
     ["few views, a missing wedge, truncation", "reconstruction"],
 ];
 
-/// A sample of a run: its reading is the caller's.
+/// A sample of a run, with the caller's reading.
 fn sample(run: &Run, at: f64, [measured, standard_error]: [f64; 2], truth: f64) -> Sample {
     Sample {
         at,
@@ -77,7 +77,7 @@ fn photons(bench: &Bench, parameters: &Value) -> Result<Run> {
     bench.run(&simulation(parameters), Reads::Ledger(&[]))
 }
 
-/// `base` with the members of `more`.
+/// The members of `base` and `more` together; `more` has precedence.
 fn with(base: &Value, more: &Value) -> Value {
     let mut all = base.clone();
     for (key, value) in more.as_object().into_iter().flatten() {
@@ -86,7 +86,7 @@ fn with(base: &Value, more: &Value) -> Value {
     all
 }
 
-/// The mean over values that are estimates of the same, and its standard error.
+/// The mean over values that are estimates of the same quantity, and its standard error.
 fn mean(values: &[f64]) -> [f64; 2] {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;

@@ -1,5 +1,5 @@
-//! The step of a composite: opacity must not depend on it. In a slab of one medium it must not at all; where density changes within a
-//! step, by no more than the reply says.
+//! The step of a composite. Opacity must not depend on it at all in a slab of one medium. If density changes within a step, opacity may
+//! depend on it by no more than the reply says.
 
 use serde_json::{Value, json};
 
@@ -9,7 +9,7 @@ use crate::study::bench::{Bench, Reads, Run};
 use crate::study::verdict::{Findings, HeatMap, Sample, Sweep};
 use crate::study::{Scale, view};
 
-/// The experiment's line.
+/// The experiment's entry in the list.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "opacity_step",
     title: "The step of a composite",
@@ -20,7 +20,7 @@ pub const EXPERIMENT: Experiment = Experiment {
 
 const GREY_LEVEL: f64 = 1.0 / 255.0;
 
-/// How a ray is sampled: more than one sample begin at random places within the first step.
+/// The sampling of a ray. If there is more than one sample, they begin at random places within the first step.
 #[derive(Clone, Copy)]
 struct How {
     samples: u64,
@@ -29,7 +29,7 @@ struct How {
 
 const PLAIN: How = How { samples: 1, pre_integrated: false };
 
-/// Looks along z at what `depth` of opacity is spread over.
+/// Looks along z at a volume with this opacity per unit at a value of 1.
 fn alpha(bench: &Bench, volume: &Value, sigma_per_unit: f64, step: f64, how: How) -> Result<Run> {
     let points = json!([{"value": 0, "color": [1, 1, 1], "opacity_per_unit": 0},
         {"value": 1, "color": [1, 1, 1], "opacity_per_unit": sigma_per_unit}]);
@@ -80,10 +80,10 @@ fn run(bench: &Bench, _: Scale) -> Result<Findings> {
 
 const STEPS: [f64; 7] = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
 
-/// Of 32 voxels along the ray these are the slab's: nothing that a step could be a multiple of.
+/// The slab's voxels of the 32 along the ray. Their number is no multiple of a long step.
 const SLAB: std::ops::Range<f64> = 9.0..20.0;
 
-/// A slab with soft edges, one voxel wide, in an empty box: its depth is the sum over the voxels.
+/// A slab with soft edges, one voxel wide, in an empty box. Its depth is the sum over the voxels.
 fn edges(bench: &Bench) -> Result<Value> {
     bench.floats([4, 4, 32], [2.0; 3], |p| f64::from(u8::from(SLAB.contains(&(16.0 * (p[2] + 1.0))))))
 }
@@ -93,7 +93,7 @@ fn edge(bench: &Bench, volume: &Value, depth: f64, step: f64, how: How) -> Resul
     let run = alpha(bench, volume, depth / length, step, how)?;
     let truth = -(-depth).exp_m1();
     let mut sample = sample(&run, step, [1.0 - mean(&run.values)[0], 0.0], truth);
-    // What the reply says of itself is relative to the picture's mean, which is all alike; a grey level is not seen.
+    // The reply's error is relative to the picture's mean, and the picture is uniform. A grey level is not seen.
     sample.permitted = (run.stated_error.unwrap_or(0.0) * truth).max(GREY_LEVEL);
     Ok(sample)
 }

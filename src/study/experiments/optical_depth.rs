@@ -1,4 +1,4 @@
-//! Optical depths up to 200: what is left is e^(−τ) or nothing, never NaN; where nothing is absorbed nothing goes dark.
+//! Optical depths up to 200. The transmittance is e^(−τ) or nothing, never NaN. Without absorption nothing goes dark.
 
 use serde_json::{Value, json};
 
@@ -8,7 +8,7 @@ use crate::study::bench::{Bench, Reads};
 use crate::study::verdict::{Findings, Sample, Sweep};
 use crate::study::{Scale, view};
 
-/// The experiment's line.
+/// The experiment's entry in the list.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "optical_depth",
     title: "Optical depth up to 200",
@@ -29,7 +29,7 @@ fn run(bench: &Bench, scale: Scale) -> Result<Findings> {
             let run = photons(bench, &parameters)?;
             let truth = (-depth).exp();
             let [measured, error] = run.fraction("exit_plus_z");
-            // Of so few photons that none gets through the spread is not known: it is a binomial's.
+            // With so few photons that none gets through, the measured spread is not known; it is a binomial's.
             Ok(sample(&run, depth, [measured, error.max((truth / f64::from(count)).sqrt())], truth))
         };
         sweeps.push(sweep(&format!("photon_transport, {tracking}: transmittance"), of)?);
@@ -42,7 +42,7 @@ fn run(bench: &Bench, scale: Scale) -> Result<Findings> {
         let own = json!({"transfer_function": {"points": ends}, "jitter": false, "opacity_threshold": 1});
         let run = bench.run(&view("emission_absorption", &constant, &camera, 16, 1, &own), Reads::Transmittance)?;
         let mut sample = sample(&run, depth, [mean(&run.values)[0], 0.0], (-depth).exp());
-        // Of 1 − alpha: the device's exponentials are good to a few 1e-5, a hundredth of a grey level.
+        // The bound is for 1 − alpha: the device's exponentials are good to a few 1e-5, a hundredth of a grey level.
         sample.permitted = 5e-5;
         Ok(sample)
     })?);

@@ -1,4 +1,4 @@
-//! Density where hardly any room is: one voxel, or a thin shell. Every tracker must find it; majorants of the whole cost the most.
+//! Density in hardly any of the room: one voxel, or a thin shell. Every tracker must find it; majorants of the whole cost the most.
 
 use glam::DVec3;
 use serde_json::json;
@@ -10,7 +10,7 @@ use crate::study::bench::Bench;
 use crate::study::oracle::{Grid, Medium, means};
 use crate::study::verdict::{Findings, Sweep};
 
-/// One voxel's line.
+/// One voxel's entry in the list.
 pub const VOXEL: Experiment = Experiment {
     name: "outlier_voxel",
     title: "One voxel of great density",
@@ -18,7 +18,7 @@ pub const VOXEL: Experiment = Experiment {
     expected: "means equal for all trackers; a majorant of the whole is slow, local ones are not",
     run: |b, s| run(b, s, |p, value| if p.abs().max_element() < 0.08 { value } else { 0.3 }),
 };
-/// A shell's line.
+/// The shell's entry in the list.
 pub const SHELL: Experiment = Experiment {
     name: "thin_shell",
     title: "A thin shell of great density in a vacuum",

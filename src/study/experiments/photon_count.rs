@@ -1,4 +1,4 @@
-//! More photons: the error of P1's transmittance must go on falling as their root, where sums in single precision would stand still.
+//! More photons. The error of P1's transmittance must go on falling as their root; with sums in single precision it would stand still.
 
 use serde_json::json;
 
@@ -8,7 +8,7 @@ use crate::study::Scale;
 use crate::study::bench::Bench;
 use crate::study::verdict::{Findings, Sweep};
 
-/// The experiment's line.
+/// The experiment's entry in the list.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "photon_count",
     title: "More photons",
@@ -17,7 +17,7 @@ pub const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// P1 (van de Hulst).
+/// The total transmittance of P1 (van de Hulst).
 const TRANSMITTANCE: f64 = 0.660_957_7;
 
 fn run(bench: &Bench, scale: Scale) -> Result<Findings> {

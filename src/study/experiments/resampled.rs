@@ -1,4 +1,4 @@
-//! A smooth blob in finer and coarser voxels: the same picture but for what linear interpolation is wrong by.
+//! A smooth blob in finer and coarser voxels: the same picture but for the error of linear interpolation.
 
 use glam::{DVec3, dvec3};
 use serde_json::json;
@@ -10,7 +10,7 @@ use crate::study::oracle::{Eye, inside};
 use crate::study::verdict::{Findings, Sweep};
 use crate::study::{Scale, view};
 
-/// The experiment's line.
+/// The experiment's entry in the list.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "resampled",
     title: "A volume resampled finer or coarser",
@@ -20,10 +20,10 @@ pub const EXPERIMENT: Experiment = Experiment {
 };
 
 const SIDE: usize = 48;
-/// Of the blob e^(−r² / 2 s²).
+/// The width s of the blob e^(−r² / 2 s²), and its greatest extinction.
 const WIDTH: f64 = 0.3;
 const SIGMA: f64 = 3.0;
-/// However coarse the voxels, so much and no more.
+/// The greatest permitted error, relative, however coarse the voxels.
 const COARSEST: f64 = 0.1;
 /// Steps of the host's integral.
 const STEPS: usize = 500;
@@ -46,15 +46,15 @@ fn run(bench: &Bench, scale: Scale) -> Result<Findings> {
         for n in scale.pick(vec![8, 16, 32, 64], vec![8, 12, 16, 24, 32, 48, 64, 96, 128]) {
             let volume = bench.floats([n; 3], [2.0; 3], |p| blob(DVec3::from(p)))?;
             let h = 2.0 / n as f64;
-            // A step is a fixed length: only the voxels change.
+            // A step is a fixed length, so that only the voxels change.
             let own = json!({"transfer_function": {"points": points}, "jitter": false, "opacity_threshold": 1,
                 "interpolation": interpolation, "step_voxels": (0.02 / h).max(0.05)});
             let run = bench.run(&view("emission_absorption", &volume, &eye.json(), SIDE, 1, &own), Reads::Luminance)?;
             let measured = run.values.iter().sum::<f64>() / run.values.len() as f64;
             let mut sample = sample(&run, h, [measured, 0.0], truth);
-            // The greatest second derivative is 1 / s²: linear interpolation is wrong by up to 3 h²/8 of it, nearest by h/2 of the first
-            // derivative, a spline's smoothing by h²/6 of three second ones; a path through the box is at most 2 √3 long, and what is
-            // wrong in one place is not in another: the mean over the picture is wrong by a part of it.
+            // The greatest second derivative is 1 / s². Linear interpolation is wrong by up to 3 h²/8 of it, nearest by h/2 of the first
+            // derivative, a spline's smoothing by h²/6 of three second ones. A path through the box is at most 2 √3 long. Different places
+            // are wrong by different amounts, so the mean over the picture is wrong by a part of this.
             let [slope, bend] = [(-0.5f64).exp() / WIDTH, 1.0 / (WIDTH * WIDTH)];
             let density = match interpolation {
                 "nearest" => 0.5 * h * 3f64.sqrt() * slope,

@@ -1,4 +1,4 @@
-//! Light scattered once where it is scattered often: what a slab sends back lacks all that was scattered again.
+//! Light scattered once in a medium that scatters often. The light that a slab sends back lacks all that was scattered again.
 
 use serde_json::{Value, json};
 
@@ -10,7 +10,7 @@ use crate::study::cases::scattering::{request, slab};
 use crate::study::verdict::{Findings, HeatMap, Sample, Sweep};
 use crate::technique::slab::reflected;
 
-/// The experiment's line.
+/// The experiment's entry in the list.
 pub const EXPERIMENT: Experiment = Experiment {
     name: "single_scattering",
     title: "Light scattered once, in slabs of rising depth",
@@ -19,19 +19,19 @@ pub const EXPERIMENT: Experiment = Experiment {
     run,
 };
 
-/// Of the host's integral equation.
+/// The number of cells of the host's integral equation.
 const CELLS: usize = 300;
-/// A picture may lack so much without a word.
+/// The part of the light that a picture may lack without a warning.
 const PERMITTED: f64 = 0.01;
 
-/// What a technique that follows so many scatterings sees of a slab, over what there is to see.
+/// The light of a slab that a technique sees with `followed` scatterings, over all of its light.
 fn seen(bench: &Bench, volume: &Value, slab: [f64; 2], followed: Option<u32>, samples: u64) -> Result<Sample> {
     let [depth, albedo] = slab;
     let (technique, more) = match followed {
         Some(1) => ("single_scatter", json!({})),
         followed => ("volume_path", json!({"max_scatterings": followed})),
     };
-    // Where little is met, little is known of it.
+    // Thin slabs need more samples, since few of them meet anything.
     let samples = (samples as f64 * (0.3 / depth).clamp(1.0, 16.0)) as u64;
     let run = bench.run(&request(technique, volume, slab, samples, &more), Reads::Luminance)?;
     let whole = reflected(depth, albedo, None, CELLS).radiance;

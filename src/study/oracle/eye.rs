@@ -3,15 +3,15 @@
 use glam::DVec3;
 use serde_json::{Value, json};
 
-/// Sub-pixels along a side that the mean over a pixel is taken of.
+/// The number of sub-pixels along a side of a pixel, for the mean over it.
 const SUB_PIXELS: usize = 8;
 
 /// A camera of parallel rays that looks at the origin.
 #[derive(Debug, Clone, Copy)]
 pub struct Eye {
-    /// Where it stands.
+    /// The position of the camera.
     pub eye: DVec3,
-    /// Side of what it sees, world units.
+    /// The side of the visible square, world units.
     pub wide: f64,
 }
 
@@ -20,18 +20,18 @@ impl Eye {
         if self.eye.normalize().y.abs() > 0.9 { DVec3::X } else { DVec3::Y }
     }
 
-    /// What goes under `camera`.
+    /// The value of a request's `camera`.
     pub fn json(&self) -> Value {
         let fov = 2.0 * (0.5 * self.wide / self.eye.length()).atan().to_degrees();
         json!({"eye": self.eye.to_array(), "target": [0, 0, 0], "up": self.up().to_array(), "fov_y_deg": fov, "projection": "orthographic"})
     }
 
-    /// Where all rays go.
+    /// The direction of all rays.
     pub fn forward(&self) -> DVec3 {
         -self.eye.normalize()
     }
 
-    /// Where the ray of a place in the picture starts: from 0 to 1, left to right and top to bottom.
+    /// The origin of the ray of a place in the picture, from 0 to 1, left to right and top to bottom.
     pub fn origin(&self, x: f64, y: f64) -> DVec3 {
         let forward = self.forward();
         let right = forward.cross(self.up()).normalize();
@@ -53,7 +53,7 @@ impl Eye {
     }
 }
 
-/// Where a ray is inside the box of half size `half`, as distances from its origin.
+/// The part of a ray inside the box of half size `half`, as distances from its origin.
 pub fn inside(origin: DVec3, direction: DVec3, half: DVec3) -> Option<(f64, f64)> {
     let (mut near, mut far) = (0.0f64, f64::INFINITY);
     for axis in 0..3 {

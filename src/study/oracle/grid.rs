@@ -15,7 +15,7 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// `value` at the cells' centres.
+    /// A grid with `value` at the cells' centres.
     pub fn of(dims: [usize; 3], half: DVec3, value: impl Fn(DVec3) -> f64) -> Self {
         let count = DVec3::from(dims.map(|n| n as f64));
         let cells = (0..dims.iter().product()).map(|i: usize| {
@@ -25,7 +25,7 @@ impl Grid {
         Self { dims, half, values: cells.collect() }
     }
 
-    /// A volume's voxels, where its axes are the world's.
+    /// A grid of a volume's voxels, if the volume's axes are the world's.
     pub fn of_volume(volume: &Volume) -> Self {
         let dims = volume.dims();
         let to_index = volume.index_from_world();
@@ -38,13 +38,13 @@ impl Grid {
         Self::of(dims, volume.world_half_size(), at)
     }
 
-    /// The same with all values times `by`.
+    /// The grid with all values times `by`.
     pub fn scaled(mut self, by: f64) -> Self {
         self.values.iter_mut().for_each(|v| *v *= by);
         self
     }
 
-    /// Linear between the cells' centres, constant beyond the outermost.
+    /// The value at a place: linear between the cells' centres, constant beyond the outermost.
     pub fn trilinear(&self, p: DVec3) -> f64 {
         let count = DVec3::from(self.dims.map(|n| n as f64));
         let at = ((p / self.half + 1.0) * 0.5 * count - 0.5).clamp(DVec3::ZERO, count - 1.0);
@@ -65,17 +65,18 @@ impl Grid {
         self.values[x + self.dims[0] * (y + self.dims[1] * z)]
     }
 
-    /// How far from `p` along the unit vector `d` the integral of the values reaches `depth`; none where it leaves the box before.
+    /// The distance from `p` along the unit vector `d` at which the integral of the values reaches `depth`; `None` if it leaves the box
+    /// before.
     pub fn free_path(&self, p: DVec3, d: DVec3, depth: f64) -> Option<f64> {
         self.along(p, d, depth).ok()
     }
 
-    /// The integral of the values from `p` along the unit vector `d` to where it leaves the box.
+    /// The integral of the values from `p` along the unit vector `d` to the end of the box.
     pub fn depth(&self, p: DVec3, d: DVec3) -> f64 {
         self.along(p, d, f64::INFINITY).unwrap_or_else(|whole| whole)
     }
 
-    /// The way to where the integral reaches `limit`, or the whole integral.
+    /// The distance at which the integral reaches `limit`, or as an error the whole integral.
     fn along(&self, p: DVec3, d: DVec3, limit: f64) -> Result<f64, f64> {
         let Some((near, far)) = inside(p, d, self.half) else { return Err(0.0) };
         let count = DVec3::from(self.dims.map(|n| n as f64));

@@ -11,17 +11,17 @@ pub use paths::{Light, Medium, henyey_greenstein};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// SplitMix64 (Steele, Lea, Flood, OOPSLA 2014): nothing in common with the kernels' generator.
+/// A generator, SplitMix64 (Steele, Lea, Flood, OOPSLA 2014). It has nothing in common with the kernels' generator.
 #[derive(Debug, Clone)]
 pub struct Random(u64);
 
 impl Random {
-    /// A stream of its own for every seed.
+    /// A generator with a stream of its own for every seed.
     pub fn new(seed: u64) -> Self {
         Self(seed.wrapping_mul(0xD134_2543_DE82_EF95).wrapping_add(1))
     }
 
-    /// Strictly between 0 and 1.
+    /// A number strictly between 0 and 1.
     pub fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
@@ -30,12 +30,12 @@ impl Random {
         (((z ^ (z >> 31)) >> 11) as f64 + 0.5) / (1u64 << 53) as f64
     }
 
-    /// A unit vector, all alike.
+    /// A unit vector, uniform over the sphere.
     pub fn direction(&mut self) -> DVec3 {
         self.turned(DVec3::Z, 0.0)
     }
 
-    /// A unit vector whose cosine with `d` is as Henyey and Greenstein say.
+    /// A unit vector whose cosine with `d` follows Henyey and Greenstein's distribution.
     pub fn turned(&mut self, d: DVec3, g: f64) -> DVec3 {
         let u = 2.0 * self.unit() - 1.0;
         let cosine =
@@ -47,7 +47,7 @@ impl Random {
     }
 }
 
-/// Means of `count` estimates of several numbers each, and their standard errors, on all cores; the same on any number of them.
+/// Means of `count` estimates of several numbers each, and their standard errors, on all cores. They are the same on any number of cores.
 pub fn means<const N: usize>(
     count: usize,
     seed: u64,

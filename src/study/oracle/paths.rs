@@ -4,14 +4,14 @@ use glam::DVec3;
 
 use super::{Grid, Random, inside};
 
-/// What scatters: the grid's values are extinction; of it `albedo` is scattered as Henyey and Greenstein say.
+/// A scattering medium. The grid's values are extinction; the part `albedo` of it is scattered by Henyey and Greenstein's phase function.
 #[derive(Debug, Clone)]
 pub struct Medium {
-    /// Extinction.
+    /// The extinction.
     pub extinction: Grid,
-    /// Scattered part of it.
+    /// The scattered part of the extinction.
     pub albedo: f64,
-    /// Mean cosine.
+    /// The mean cosine of the scattering angle.
     pub g: f64,
 }
 
@@ -20,7 +20,7 @@ pub struct Medium {
 pub struct Light {
     /// The unit vector to the sun.
     pub to_sun: DVec3,
-    /// What falls on a plane that faces it.
+    /// The irradiance on a plane that faces the sun.
     pub irradiance: f64,
     /// The sky's radiance, from everywhere.
     pub sky: f64,
@@ -32,7 +32,7 @@ pub fn henyey_greenstein(g: f64, cosine: f64) -> f64 {
 }
 
 impl Medium {
-    /// One estimate of the radiance that comes to `p` from against the unit vector `d`.
+    /// One estimate of the radiance that comes to `p` against the unit vector `d`.
     pub fn radiance(&self, light: &Light, random: &mut Random, mut p: DVec3, mut d: DVec3) -> f64 {
         let mut sum = 0.0;
         let mut weight = 1.0;
@@ -52,7 +52,7 @@ impl Medium {
         sum + weight * light.sky
     }
 
-    /// What becomes of a photon from `p`: the weight absorbed, and what leaves by the faces −x, +x, −y, … .
+    /// The end of a photon from `p`: the weights that leave by the faces −x, +x, −y, … , and the absorbed weight.
     pub fn photon(&self, random: &mut Random, mut p: DVec3) -> [f64; 7] {
         let mut tally = [0.0; 7];
         let (mut d, mut weight) = (random.direction(), 1.0);

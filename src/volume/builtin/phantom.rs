@@ -8,13 +8,13 @@
 /// An ellipsoid of the phantom; where several overlap, their greys add.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ellipsoid {
-    /// What it adds to the value of the points within.
+    /// The grey that it adds to the points within.
     pub grey: f64,
-    /// Semi-axes along its own x, y, z.
+    /// The semi-axes along its own x, y, z.
     pub semi_axes: [f64; 3],
-    /// Its middle.
+    /// The centre.
     pub centre: [f64; 3],
-    /// Rotation about z in degrees, from the world's x axis to its own.
+    /// The rotation about z in degrees, from the world's x axis to its own.
     pub angle_deg: f64,
 }
 
@@ -40,7 +40,7 @@ impl Ellipsoid {
     /// True if the point is inside or on the surface.
     pub fn contains(&self, x: f64, y: f64, z: f64) -> bool {
         let [x, y, z] = [x - self.centre[0], y - self.centre[1], z - self.centre[2]];
-        // Most points are outside of most ellipsoids: the sphere around one is cheaper to ask than sine and cosine.
+        // Most points are outside of most ellipsoids, and a test of the sphere around one is cheaper than sine and cosine.
         let reach = self.semi_axes[0].max(self.semi_axes[1]).max(self.semi_axes[2]);
         if x * x + y * y + z * z > reach * reach {
             return false;

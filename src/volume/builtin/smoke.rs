@@ -4,17 +4,17 @@
 //! gradient noise ("Improving noise", SIGGRAPH 2002) with the lattice's gradients hashed from the seed. Values are in
 //! [0, 1], 0 near the box's faces, so that the puff is never cut off.
 
-/// Radius of the undisturbed ball.
+/// The radius of the undisturbed ball.
 const RADIUS: f64 = 0.5;
-/// How far the noise moves its surface.
+/// The amplitude of the noise that moves its surface.
 const AMPLITUDE: f64 = 0.55;
-/// Noise cells per unit of length in the first octave.
+/// The noise cells per unit of length in the first octave.
 const FREQUENCY: f64 = 2.1;
-/// Octaves: the last has details of 1/34 of a unit, four voxels at the default resolution.
+/// The number of octaves. The last has details of 1/34 of a unit, four voxels at the default resolution.
 const OCTAVES: u32 = 5;
-/// Amplitude from octave to octave.
+/// The ratio of amplitudes from octave to octave.
 const GAIN: f64 = 0.52;
-/// Depth below the disturbed surface at which the smoke is at its densest.
+/// The depth below the disturbed surface at which the smoke is at its densest.
 const SOFTNESS: f64 = 0.35;
 /// The smoke ends at this distance from the middle at the latest.
 const END: f64 = 0.98;
@@ -31,12 +31,12 @@ pub fn value(x: f64, y: f64, z: f64, seed: u64) -> f64 {
     let Some(noise) = fbm([x, y, z], seed, (r - RADIUS) / AMPLITUDE) else { return 0.0 };
     let edge = RADIUS - r + AMPLITUDE * noise;
     let fade = smoothstep((END - r) / 0.2);
-    // Billows: dark creases where the noise changes its sign.
+    // Billows have dark creases where the noise changes its sign.
     let texture = 0.35 + 0.65 * smoothstep(noise.abs() * 1.6);
     smoothstep(edge / SOFTNESS) * texture * fade
 }
 
-/// 3t² − 2t³ on [0, 1], constant beyond.
+/// The function 3t² − 2t³ on [0, 1], constant beyond.
 fn smoothstep(t: f64) -> f64 {
     let t = t.clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
@@ -46,7 +46,7 @@ fn smoothstep(t: f64) -> f64 {
 fn fbm(at: [f64; 3], seed: u64, least: f64) -> Option<f64> {
     let (mut sum, mut amplitude, mut frequency) = (0.0, 1.0, FREQUENCY);
     for octave in 0..OCTAVES {
-        // Mixed first, so that the octaves of neighbouring seeds are not each other's.
+        // The seed is mixed first, so that neighbouring seeds do not share octaves.
         let key = mix(seed).wrapping_add(u64::from(octave));
         sum += amplitude * gradient_noise(at.map(|p| p * frequency), key);
         amplitude *= GAIN;
@@ -54,7 +54,7 @@ fn fbm(at: [f64; 3], seed: u64, least: f64) -> Option<f64> {
         if sum + NOISE_BOUND * amplitude / (1.0 - GAIN) <= least {
             return None;
         }
-        // Not 2: the lattices of the octaves must not share their zeros.
+        // The factor is not 2, since the lattices of the octaves must not share their zeros.
         frequency *= 2.03;
     }
     (sum > least).then_some(sum)
@@ -81,7 +81,7 @@ fn gradient_noise(at: [f64; 3], seed: u64) -> f64 {
     sum
 }
 
-/// Dot product with one of the twelve edge directions of a cube (four of them twice), chosen by four bits.
+/// The dot product with one of the twelve edge directions of a cube (four of them twice), chosen by four bits.
 fn along_gradient(hash: u64, [x, y, z]: [f64; 3]) -> f64 {
     let choice = hash & 15;
     let u = if choice < 8 { x } else { y };

@@ -1,4 +1,4 @@
-//! Where studies are kept: a folder of results with their charts, over those that this program was built with.
+//! The stored results of studies: a folder of results with their charts, over those that this program was built with.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use super::stability::Stability;
 use super::{draw, page};
 use crate::error::{Error, Result};
 
-/// Those of the repository, measured on the machine that they name.
+/// The results of the repository, measured on the machine that they name.
 static BUILT_IN: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/docs/charts");
 
 /// The name of the experiments' study.
@@ -21,27 +21,27 @@ pub const STABILITY: &str = "stability";
 /// The name of the planner's study.
 pub const PLANNER: &str = "planner";
 
-/// What the names of records start with that compare with another program: `./dev bench equal_error` makes them.
+/// The prefix of the names of records that compare with another program; `./dev bench equal_error` makes them.
 pub const PEERS: &str = "vtk_";
 
-/// A folder of studies.
+/// A folder of stored results.
 #[derive(Debug, Clone)]
-pub struct Shelf {
+pub struct Results {
     folder: PathBuf,
 }
 
-impl Shelf {
-    /// The shelf of this folder, which need not exist.
+impl Results {
+    /// The results of this folder, which need not exist.
     pub fn new(folder: PathBuf) -> Self {
         Self { folder }
     }
 
-    /// Where it is.
+    /// The folder of the results.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// A file, `{name}.json` or `{name}.svg`: the folder's, or else the one built in.
+    /// The bytes of a file, `{name}.json` or `{name}.svg`, from the folder or else from those built in.
     pub fn read(&self, file: &str) -> Option<Vec<u8>> {
         let plain = file.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_' || b == b'.');
         if !plain || file.starts_with('.') {
@@ -77,10 +77,10 @@ impl Shelf {
         self.write("README.md", &page::page(&records))
     }
 
-    /// Puts the experiments' numbers, charts and page in the folder. Experiments that were not run now stay as they were.
+    /// Puts the experiments' numbers, charts and page in the folder. Experiments that were not run this time stay as they were.
     ///
     /// # Errors
-    /// As [`Shelf::put`].
+    /// As [`Results::put`].
     pub fn put_stability(&self, mut found: Stability) -> Result<()> {
         if let Some(old) = self.record::<Stability>(STABILITY) {
             let order = |name: &str| super::experiments::EXPERIMENTS.iter().position(|e| e.name == name);
@@ -101,11 +101,11 @@ impl Shelf {
         Ok(())
     }
 
-    /// Puts the planner's figures and their page in the folder, beside those of other scenes that the same program has had on the same
-    /// machine. Returns all of them.
+    /// Puts the planner's figures and their page in the folder, beside those of other scenes from the same program on the same machine.
+    /// Returns all of them.
     ///
     /// # Errors
-    /// As [`Shelf::put`].
+    /// As [`Results::put`].
     pub fn put_planned(&self, mut found: Planned) -> Result<Planned> {
         if let Some(old) = self.record::<Planned>(PLANNER).filter(|old| old.machine.is_same(&found.machine)) {
             let again = |o: &super::planner::Outcome| found.scenes.iter().any(|new| new.scene == o.scene);
