@@ -8,38 +8,12 @@
 #include "shared/lanes.h"
 #include "shared/optical.h"
 #include "shared/packet.h"
+#include "shared/pre_integrated.h"
+#include "shared/radiance.h"
 #include "shared/resume.h"
 #include "shared/shade.h"
 #include "shared/style.h"
 #include "shared/volume.h"
-
-typedef struct { Real3 colour; Real transmittance; } Radiance;
-
-// The weight of a sample behind all that are there, in the lanes whose ray has not ended; it lowers the transmittance.
-static inline Real weight_of(constant const EmissionAbsorption *params, Real alpha, Radiance *r) {
-    Real weight = select((Real)(0.0f), r->transmittance * alpha, MASK(r->transmittance > params->transmittance_floor));
-    r->transmittance -= weight;
-    return weight;
-}
-
-static inline void add_light(Real3 colour, Real weight, Radiance *r) {
-    r->colour = real3(mad(colour.x, weight, r->colour.x), mad(colour.y, weight, r->colour.y), mad(colour.z, weight, r->colour.z));
-}
-
-// Puts a sample behind (or, back to front, before) those that are there, in the lanes whose ray has not ended.
-static inline void composite(constant const EmissionAbsorption *params, Optical o, Radiance *r) {
-#if BACK_TO_FRONT
-    r->colour = add3(scale3(r->colour, 1.0f - o.alpha), scale3(o.colour, o.alpha));
-    r->transmittance *= 1.0f - o.alpha;
-#else
-    add_light(o.colour, weight_of(params, o.alpha, r), r);
-#endif
-}
-
-// The opacity of `times` the extinction: 1 - (1 - alpha)^times.
-static inline Real opacity_times(Real alpha, Real times) {
-    return select(1.0f - exp2(log2(1.0f - alpha) * times), (Real)(0.0f), MASK(times <= 0.0f));
-}
 
 #if STYLED
 // The transfer function of value and gradient magnitude, 256 x 256 entries.
@@ -64,61 +38,6 @@ static inline void styled_step(constant const View *view, constant const Emissio
     o.alpha = select((Real)(0.0f), opacity_times(o.alpha, factor), inside & MASK(factor == factor));
     if (!any_lane(MASK(o.alpha > 0.0f))) return;
     o.colour = styled_colour(view, params, &s, o.colour);
-    composite(params, o, r);
-}
-#endif
-
-#if PREINTEGRATED
-// The table: at each entry the integrals from the first of sigma, sigma r, sigma g, sigma b, then their integrands, which
-// beyond the table stay what they are at its ends.
-static inline Real integral(global const uchar *table, int which, Real x) {
-    Real within = clamp(x, (Real)(0.0f), (Real)(TABLE_SIZE - 1));
-    Int i = min(to_int(within), (Int)(TABLE_SIZE - 2));
-    global const float *column = (global const float *)table + which;
-    Real low = gather_reals(column, i << 3), high = gather_reals(column + 8, i << 3);
-    Real sum = mad(high - low, within - to_real(i), low);
-    Mask beyond = MASK(x != within);
-    if (!any_lane(beyond)) return sum;
-    return mad(x - within, gather_reals(column + 4, to_int(within) << 3), sum);
-}
-
-// Between two values taken at the ends of a step the value is taken to be linear: the mean of a quantity over them is the
-// difference of its integrals over the difference of the values (Engel, Kraus, Ertl, "High-Quality Pre-Integrated Volume
-// Rendering Using Hardware-Accelerated Pixel Shading", 2001), so the error falls with the square of the step. Values close
-// together take the integrand in their middle.
-static inline Real between(global const uchar *table, int which, Real a, Real b, Mask close) {
-    Real position = clamp(0.5f * (a + b) + 0.5f, (Real)(0.0f), (Real)(TABLE_SIZE - 1));
-    Real middle = gather_reals((global const float *)table + 4 + which, to_int(position) << 3);
-    if (!any_lane(~close)) return middle;
-    Real mean = (integral(table, which, b) - integral(table, which, a)) / select(b - a, (Real)(1.0f), close);
-    return select(mean, middle, close);
-}
-
-// The position of the value at t in the table, neither rounded nor clamped; NaN where the value is.
-static inline Real table_position_at(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels, const Packet *p,
-                            Real t) {
-    Real raw = sample_raw(view, voxels, along(p->ray.origin, p->ray.direction, t));
-    return clamp(mad(raw, (Real)(params->table_scale), (Real)(params->table_offset - 0.5f)), (Real)(-1e7f), (Real)(1e7f)) + 0.0f * raw;
-}
-
-static inline void preintegrated_step(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
-                                      global const uchar *table, const Packet *p, int k, Radiance *r) {
-    Real from = fmax((Real)((float)k * view->step), p->ray.t_near), to = fmin((Real)((float)(k + 1) * view->step), p->ray.t_far);
-    Mask inside = MASK(to > from);
-    if (!any_lane(inside)) return;
-    Real a = table_position_at(view, params, voxels, p, from), b = table_position_at(view, params, voxels, p, to);
-    inside &= MASK(a == a) & MASK(b == b);
-    a = select((Real)(0.0f), a, inside), b = select((Real)(0.0f), b, inside);
-    Mask close = MASK(fabs(b - a) < 4.0f);
-    Real sigma = between(table, 0, a, b, close), inverse = 1.0f / fmax(sigma, (Real)(1e-30f));
-    Optical o;
-    o.alpha = select((Real)(0.0f), 1.0f - exp(-sigma * (to - from)), inside & MASK(sigma > 0.0f));
-    if (!any_lane(MASK(o.alpha > 0.0f))) return;
-    o.colour = real3(between(table, 1, a, b, close) * inverse, between(table, 2, a, b, close) * inverse, between(table, 3, a, b, close) * inverse);
-#if SHADED
-    Real3 at = along(p->ray.origin, p->ray.direction, 0.5f * (from + to));
-    o.colour = shade(view, gradient_raw(view, voxels, at), 1.0f, p->half_way, o.colour);
-#endif
     composite(params, o, r);
 }
 #endif

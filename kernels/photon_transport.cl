@@ -26,16 +26,6 @@ typedef struct {
     UInt4Lanes random;
 } Step;
 
-static inline Photon no_photon(constant const PhotonTransport *params) {
-    Photon photon;
-    photon.p = photon.d = real3(0.0f, 0.0f, 0.0f);
-    photon.cell.x = photon.cell.y = photon.cell.z = photon.medium = photon.clearance = photon.scatterings = (Int)(0);
-    photon.weight = photon.depth = photon.optical = photon.path = (Real)(0.0f);
-    photon.energy = (Real)(params->source_kev);
-    photon.number = photon.event = (UInt)(0u);
-    return photon;
-}
-
 // Launches the next photons in the free lanes.
 static inline void begin(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table, global ulong *ledger,
                          Queue *q, Photon *photon, Mask *alive, Int *steps, Gains *gains) {

@@ -11,7 +11,6 @@
 #include "shared/lanes.h"
 #include "shared/phase.h"
 
-#define LIGHT_NUMBERS 16
 #define TURN 6.28318531f
 
 static inline Real magnitude(Real3 c) { return fmax(fabs(c.x), fmax(fabs(c.y), fabs(c.z))); }

@@ -6,8 +6,6 @@
 #include "shared/lanes.h"
 #include "shared/voxel.h"
 
-#define TABLE_SIZE 4096
-
 typedef struct { Real3 colour; Real alpha; } Optical;
 
 // An entry of the table is two words: the opacity's float less its ten lowest bits, which hold the upper bits of blue, its two
@@ -43,7 +41,6 @@ static inline Real table_position(constant const EmissionAbsorption *params, Rea
 
 // Behind the table of a function that is smooth but for some kinks stand its pieces: their starts, the ends of their empty parts, and their
 // polynomials, a cubic for the opacity and a line for each colour (src/technique/emission_absorption/pieces.rs).
-#define PIECES 16
 typedef struct { float start[PIECES], empty[PIECES], opacity[4][PIECES], colour[3][2][PIECES]; } Pieces;
 
 #define PIECES_OF(table) ((global const Pieces *)((table) + 8 * TABLE_SIZE))

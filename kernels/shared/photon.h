@@ -23,6 +23,16 @@ typedef struct {
     Int scatterings;
 } Photon;
 
+static inline Photon no_photon(constant const PhotonTransport *params) {
+    Photon photon;
+    photon.p = photon.d = real3(0.0f, 0.0f, 0.0f);
+    photon.cell.x = photon.cell.y = photon.cell.z = photon.medium = photon.clearance = photon.scatterings = (Int)(0);
+    photon.weight = photon.depth = photon.optical = photon.path = (Real)(0.0f);
+    photon.energy = (Real)(params->source_kev);
+    photon.number = photon.event = (UInt)(0u);
+    return photon;
+}
+
 #if HAS_CLEARANCE
 // Reads the medium and clearance of the cells that photons have come to.
 static inline void update_clearance(constant const PhotonTransport *params, global const float *table, Mask moved, Photon *photon) {

@@ -7,8 +7,6 @@
 
 #include "shared/lanes.h"
 
-#define RESUME_HEADER 16
-
 // The header of a work-item. The state behind it is aligned as lanes want it.
 static inline global uint *resume_header(global uint *state, uint item, uint words) {
     return state + RESUME_HEADER + (size_t)item * (RESUME_HEADER + words * LANES);

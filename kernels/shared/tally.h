@@ -4,8 +4,6 @@
 
 #include "shared/lanes.h"
 
-#define FIXED_ONE 1073741824.0f
-
 static inline ULong fixed(Real amount) { return ulong_rounded(amount * FIXED_ONE); }
 
 static inline void tally_fixed(global ulong *sums, Int cell, ULong amount, Mask active) {

@@ -7,7 +7,6 @@
 
 #include "shared/lanes.h"
 
-#define TILE 16
 #if LANES == 1
 #define ITEM 1
 #define ITEMS (TILE * TILE)
@@ -27,11 +26,11 @@ static inline Tile tile_at(constant const View *view, global const uint *tiles) 
     t.left = t.top = 0;
     t.sample = t.times = t.cost_at = 0u;
     if (entry >= tiles[0]) return t;
-    global const uint *listed = tiles + 3 + 3 * entry;
+    global const uint *listed = tiles + TILES_HEADER + 3 * entry;
     int wide = (view->width + TILE - 1) / TILE, high = (view->height + TILE - 1) / TILE, tile = (int)(tiles[2] ? listed[0] : entry);
     t.left = tile % wide * TILE + (int)(part % TILE), t.top = tile / wide * TILE + (int)(part / TILE);
     t.sample = tiles[2] ? listed[1] : tiles[1], t.times = tiles[2] ? listed[2] : 1u;
-    t.cost_at = 3u + 3u * (uint)(wide * high) + (uint)tile;
+    t.cost_at = TILES_HEADER + 3u * (uint)(wide * high) + (uint)tile;
     return t;
 }
 

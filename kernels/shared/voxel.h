@@ -16,7 +16,4 @@ typedef ushort Voxel;
 typedef float Voxel;
 #endif
 
-// Voxels along an edge of a macro-cell.
-#define CELL 4
-
 #endif

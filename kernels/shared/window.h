@@ -6,8 +6,6 @@
 #include "shared/lanes.h"
 #include "shared/packet.h"
 
-#define WINDOW_SIZE 1024
-
 // The colour of a value; entry = value scale + offset. What is not a number has the first colour.
 static inline Real3 window_colour(global const uchar *table, float scale, float offset, Real value) {
     Real x = mad(value, (Real)(scale), (Real)(offset));

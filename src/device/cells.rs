@@ -1,15 +1,13 @@
 //! Macro-cells on the device: the least and greatest value in each block of voxels, and from them the distance to anything
 //! that a view wants to see.
 
+pub use super::numbers::CELL;
 use super::program::{Source, Variant};
 use super::structs::DeviceStruct;
 use super::{Buffer, Device};
 use crate::device_struct;
 use crate::error::Result;
 use crate::volume::VoxelType;
-
-/// Voxels along an edge of a cell: `CELL` in `kernels/shared/voxel.h`.
-pub const CELL: usize = 4;
 
 device_struct! {
     /// Parameters of the kernels of the cells.

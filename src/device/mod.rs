@@ -10,6 +10,7 @@ mod images;
 mod include;
 mod launch;
 mod level;
+pub mod numbers;
 pub mod program;
 pub mod reduce;
 mod resume;

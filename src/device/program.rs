@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::enums::DeviceEnum;
 use super::include::{assemble, read};
+use super::numbers::{CELL, define};
 use super::structs::Layout;
 use crate::error::{Error, Result};
 use crate::volume::VoxelType;
@@ -77,7 +78,8 @@ impl Source {
     pub fn text(&self, overrides: Option<&Path>) -> Result<String> {
         let kernel = assemble(&format!("{}.cl", self.kernel), &|name| read(overrides, name))?;
         let structs: String = (self.structs)().iter().map(|layout| (layout.opencl_text)()).collect();
-        Ok(format!("#line 1 \"structs\"\n{}{}{structs}{kernel}", VoxelType::opencl_text(), (self.words)()))
+        let all = VoxelType::opencl_text() + &define("CELL", CELL);
+        Ok(format!("#line 1 \"structs\"\n{all}{}{structs}{kernel}", (self.words)()))
     }
 }
 

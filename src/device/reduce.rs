@@ -1,5 +1,6 @@
 //! Reductions: sums, inner products and extremes of floats on the device, the same for any number of threads and lanes (`kernels/reduce.cl`).
 
+use super::numbers::define;
 use super::program::{Source, Variant};
 use super::{Buffer, Device};
 use crate::error::{Error, Result};
@@ -17,7 +18,7 @@ const EXTREMES: Variant = Variant::new(KERNEL, None, &[]).of_function("extremes"
 pub fn source() -> Source {
     Source {
         kernel: KERNEL,
-        words: || format!("#define BLOCK {BLOCK}\n"),
+        words: || define("BLOCK", BLOCK),
         structs: Vec::new,
         variants: || variants().to_vec(),
         common: 0,

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use super::numbers::define;
 use super::{Buffer, Device};
 use crate::error::Result;
 
@@ -37,12 +38,12 @@ impl Resume {
 
     /// The `#define` of a kernel's state, `{name}_STATE_WORDS`: words of a lane.
     pub fn opencl_text(name: &str, words: usize) -> String {
-        format!("#define {name}_STATE_WORDS {words}\n")
+        define("RESUME_HEADER", HEADER) + &define(&format!("{name}_STATE_WORDS"), words)
     }
 
     /// The same of a kernel whose work-item is a beam of packets: words of a lane for each packet.
     pub fn opencl_text_of_beams(name: &str, words: usize) -> String {
-        format!("#define {name}_STATE_WORDS ({words} * PACKETS)\n")
+        define("RESUME_HEADER", HEADER) + &define(&format!("{name}_STATE_WORDS"), format!("({words} * PACKETS)"))
     }
 
     /// The kernel's `state`.

@@ -3,12 +3,13 @@
 use std::rc::Rc;
 
 use super::context::DeviceContext;
-use super::tiling::{TILE, Tiling};
+use super::tiling::Tiling;
 use crate::device::encode::PADDING;
 use crate::device::{Buffer, Device};
 use crate::error::Result;
 use crate::film::Samples;
 use crate::render::Scene;
+use crate::technique::TILE;
 
 /// One set of samples on the device.
 pub(super) struct Layer {
@@ -134,7 +135,7 @@ impl Layer {
     }
 }
 
-/// Pixels across and down of a work-item: `BEAM_W` × `TILE_W` and `BEAM_H` × `TILE_H` of `kernels/shared/packet.h`.
+/// Pixels across and down of a work-item: `BEAM_W` × `TILE_W` and `BEAM_H` × `TILE_H` of `kernels/shared/beam.h`.
 fn beam_pixels(lanes: usize) -> [usize; 2] {
     match lanes {
         16 => [8, 8],
@@ -144,7 +145,7 @@ fn beam_pixels(lanes: usize) -> [usize; 2] {
     }
 }
 
-/// Packets of a work-item: `PACKETS` of `kernels/shared/packet.h`.
+/// Packets of a work-item: `PACKETS` of `kernels/shared/beam.h`.
 pub(super) fn packets_of_beam(lanes: usize) -> usize {
     let [width, height] = beam_pixels(lanes);
     width * height / lanes

@@ -8,12 +8,8 @@
 //! calm is looked at less often. A part of the mean deviation is added to each, which keeps the bias small.
 
 use crate::film::Tiles;
-use crate::technique::Random;
+use crate::technique::{Random, TILE, TILES_HEADER};
 
-/// Pixels along a tile's side: `TILE` of `kernels/shared/tile.h`.
-pub(super) const TILE: usize = 16;
-/// Words before the list.
-const HEADER: usize = 3;
 /// The part of the mean deviation that every tile has at least.
 const FLOOR: f64 = 0.25;
 /// About how many samples a tile gets in a pass at most: its samples are taken one after the other, and a pass must not wait for long.
@@ -144,7 +140,7 @@ impl Tiling {
 
     /// Where the costs start, in bytes.
     pub fn costs_at(&self) -> usize {
-        4 * (HEADER + 3 * self.tiles())
+        4 * (TILES_HEADER + 3 * self.tiles())
     }
 }
 
@@ -176,7 +172,7 @@ mod tests {
                 tiling.plan(samples, &[0.0, 1.0, 2.0, 10.0]);
             }
             let list = tiling.pass(samples);
-            assert_eq!((list.len(), list[2]), (HEADER + 3 * list[0] as usize, 1));
+            assert_eq!((list.len(), list[2]), (TILES_HEADER + 3 * list[0] as usize, 1));
             tiling.passed();
             samples += 1;
         }

@@ -5,7 +5,7 @@ pub use super::transfer_request::{ControlPoint, Label, TransferRequest};
 use crate::error::{Error, Result, Violation};
 use crate::volume::Volume;
 
-/// The number of entries of the table that the device reads: `TABLE_SIZE` in `kernels/shared/optical.h`.
+/// The number of entries of the table that the device reads: `TABLE_SIZE` of the kernel.
 pub const TABLE_SIZE: usize = 4096;
 /// The optical depth of a preset's opacity 1 across the volume's mean side: nearly opaque, still soft.
 const PRESET_OPTICAL_DEPTH: f64 = 24.0;

@@ -7,7 +7,7 @@ use super::presets::linear;
 use crate::error::{Error, Result};
 use crate::volume::Volume;
 
-/// The number of entries of the device's table: `WINDOW_SIZE` in `kernels/shared/window.h`. The device interpolates linearly between
+/// The number of entries of the device's table: `WINDOW_SIZE` of the kernels. The device interpolates linearly between
 /// entries.
 pub const WINDOW_SIZE: usize = 1024;
 

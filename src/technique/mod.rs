@@ -37,6 +37,7 @@ pub use field::{Field, Look};
 pub use process::{Process, Progress, Step};
 pub use subject::{AskedField, Subject};
 pub use view::{CellUse, Open, PreparedView, Random, Setting, Settings, View, ViewPlan};
+pub(crate) use view::{TILE, TILES_HEADER};
 
 /// Every technique. Adding one is one line.
 pub const ALL: &[Technique] = &[

@@ -59,6 +59,7 @@ use serde_json::{Value, json};
 use super::{Field, Kind, Look, Process, Technique, Work};
 use crate::asset::Assets;
 use crate::device::enums::{DeviceEnum, PhaseKind};
+use crate::device::numbers::define;
 use crate::device::program::{Source, Variant};
 use crate::device::structs::DeviceStruct;
 use crate::device::{Device, Resume};
@@ -90,7 +91,7 @@ pub const TECHNIQUE: Technique = Technique {
     },
 };
 
-/// `FIXED_ONE` of the kernel: sums are in units of 2^-30.
+/// Sums are in units of 2^-30: `FIXED_ONE` of the kernel.
 const FIXED_ONE: f64 = 1_073_741_824.0;
 
 /// A request that works as it is.
@@ -108,6 +109,7 @@ fn source() -> Source {
         kernel: TECHNIQUE.name,
         words: || {
             "#pragma OPENCL EXTENSION cl_khr_int64_base_atomics : enable\n".to_owned()
+                + &define("FIXED_ONE", format!("{FIXED_ONE:.1}f"))
                 + &Resume::opencl_text("PHOTON", STATE_WORDS)
                 + &[Media::opencl_text(), MediumNumber::opencl_text(), PhaseKind::opencl_text()].concat()
                 + &[Tracking::opencl_text(), SourceKind::opencl_text(), BoundaryKind::opencl_text()].concat()

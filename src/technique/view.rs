@@ -13,6 +13,11 @@ use crate::scene::bounds::Bounds;
 use crate::scene::camera::Camera;
 use crate::volume::Volume;
 
+/// Pixels along a side of a tile, by which stochastic views are sampled (`kernels/shared/tile.h`).
+pub(crate) const TILE: usize = 16;
+/// Words before the list of tiles.
+pub(crate) const TILES_HEADER: usize = 3;
+
 /// The macro-cells' part in a view (`kernels/cells.cl`).
 #[derive(Debug, Clone, PartialEq)]
 pub enum CellUse {

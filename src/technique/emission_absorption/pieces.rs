@@ -7,7 +7,7 @@
 
 use crate::scene::transfer::TABLE_SIZE;
 
-/// Most pieces: lanes of a register. `PIECES` in `kernels/shared/optical.h`.
+/// Most pieces: lanes of a register. `PIECES` of the kernel.
 pub const PIECES: usize = 16;
 /// An opacity may be off by this part of itself; then a picture is off by no more.
 const OPACITY_SLACK: f32 = 1.0 / 2048.0;

@@ -4,10 +4,11 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 
-use super::pieces::pieces;
+use super::pieces::{PIECES, pieces};
 use super::regions::Region;
 use super::{EmissionAbsorption, Parameters, TECHNIQUE, regions};
 use crate::device::Resume;
+use crate::device::numbers::define;
 use crate::device::program::{Source, Variant, each_voxel_type, listed};
 use crate::device::structs::{DeviceStruct, View as DeviceView};
 use crate::error::Result;
@@ -76,7 +77,11 @@ fn permitted(wanted: Features) -> Result<&'static Features> {
 pub(super) fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
-        words: || view_words() + &Resume::opencl_text_of_beams("RADIANCE", STATE_WORDS),
+        words: || {
+            view_words()
+                + &[define("TABLE_SIZE", TABLE_SIZE), define("PIECES", PIECES)].concat()
+                + &Resume::opencl_text_of_beams("RADIANCE", STATE_WORDS)
+        },
         structs: || vec![DeviceView::LAYOUT, EmissionAbsorption::LAYOUT],
         variants: || each_voxel_type(TECHNIQUE.name, &FEATURES),
         common: COMMON * VoxelType::ALL.len(),

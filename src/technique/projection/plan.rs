@@ -7,6 +7,7 @@ use serde_json::Value;
 use super::{DeviceMode, Mode, Parameters, Projection, TECHNIQUE};
 use crate::device::Resume;
 use crate::device::enums::DeviceEnum;
+use crate::device::numbers::define;
 use crate::device::program::{Source, Variant, each_voxel_type, listed};
 use crate::device::structs::{DeviceStruct, View as DeviceView};
 use crate::error::Result;
@@ -14,7 +15,7 @@ use crate::scene;
 use crate::scene::camera::Camera;
 use crate::scene::interpolation::Interpolation;
 use crate::scene::presets::is_hounsfield;
-use crate::scene::window::{Output, Window};
+use crate::scene::window::{Output, WINDOW_SIZE, Window};
 use crate::technique::stepping::{Way, stepping};
 use crate::technique::steps::coarse_step;
 use crate::technique::view::in_words;
@@ -56,7 +57,10 @@ pub(super) fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
         words: || {
-            view_words() + &DeviceMode::opencl_text() + &Resume::opencl_text_of_beams("PROJECTION_BEAM", STATE_WORDS)
+            view_words()
+                + &define("WINDOW_SIZE", WINDOW_SIZE)
+                + &DeviceMode::opencl_text()
+                + &Resume::opencl_text_of_beams("PROJECTION_BEAM", STATE_WORDS)
         },
         structs: || vec![DeviceView::LAYOUT, Projection::LAYOUT],
         variants: || each_voxel_type(TECHNIQUE.name, &FEATURES),

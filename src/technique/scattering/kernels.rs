@@ -3,11 +3,14 @@
 use super::device::{Density, Scattering};
 use crate::device::Resume;
 use crate::device::enums::{DeviceEnum, LightKind, PhaseKind};
+use crate::device::numbers::define;
 use crate::device::program::{Source, Variant, listed};
 use crate::device::structs::{DeviceStruct, View};
 use crate::error::Result;
 use crate::scene::interpolation::Interpolation;
+use crate::scene::lights::LIGHT_NUMBERS;
 use crate::technique::majorant::Tracking;
+use crate::technique::view::{TILE, TILES_HEADER};
 use crate::technique::view_words;
 use crate::volume::VoxelType;
 
@@ -41,6 +44,8 @@ pub(in crate::technique) fn source(kernel: &'static str) -> Source {
         words: || {
             "#pragma OPENCL EXTENSION cl_khr_int64_base_atomics : enable\n".to_owned()
                 + &view_words()
+                + &[define("LIGHT_NUMBERS", LIGHT_NUMBERS), define("TILE", TILE), define("TILES_HEADER", TILES_HEADER)]
+                    .concat()
                 + &[Density::opencl_text(), Tracking::opencl_text()].concat()
                 + &[PhaseKind::opencl_text(), LightKind::opencl_text()].concat()
                 + &Resume::opencl_text("SCATTERING", STATE_WORDS)

@@ -5,12 +5,13 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::{Mode, Parameters, Plane, Slice, TECHNIQUE};
+use crate::device::numbers::define;
 use crate::device::program::{Source, Variant, each_voxel_type, listed};
 use crate::device::structs::{DeviceStruct, View as DeviceView};
 use crate::error::Result;
 use crate::scene::camera::Camera;
 use crate::scene::interpolation::Interpolation;
-use crate::scene::window::{Output, Window};
+use crate::scene::window::{Output, WINDOW_SIZE, Window};
 use crate::technique::{CellUse, PreparedView, Subject, View, ViewPlan, view_words};
 use crate::volume::{Volume, VoxelType};
 
@@ -34,7 +35,7 @@ fn permitted(wanted: Features) -> Result<&'static Features> {
 pub(super) fn source() -> Source {
     Source {
         kernel: TECHNIQUE.name,
-        words: view_words,
+        words: || view_words() + &define("WINDOW_SIZE", WINDOW_SIZE),
         structs: || vec![DeviceView::LAYOUT, Slice::LAYOUT],
         variants: || each_voxel_type(TECHNIQUE.name, &FEATURES),
         common: VoxelType::ALL.len(),
