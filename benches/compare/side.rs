@@ -74,7 +74,7 @@ impl Side {
             ("/v1/renders/{0}/frame.exr?wait=final", compare.of_bytes()),
             ("/v1/renders/{0}", compare),
         ];
-        if request["volume"].get("photon_transport").is_some() {
+        if cloudchamber::technique::fields().any(|t| request["volume"].get(t.name).is_some()) {
             paths.push(("/v1/renders/{0}/field", compare.of_bytes()));
         }
         let mut replies = vec![posted];

@@ -7,6 +7,7 @@ pub mod clip;
 pub mod depth;
 pub mod interpolation;
 pub mod light;
+mod light_source;
 pub mod lights;
 pub mod medium;
 pub mod phase;

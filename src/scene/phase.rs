@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use crate::device::enums::{DeviceEnum, PhaseKind};
 use crate::error::{Error, Result};
 
 /// A phase function. Which of the parameters count is said by `type`.
@@ -82,17 +83,18 @@ impl Phase {
     /// The kernel's kind and its three parameters. The rows of a tabulated function are appended to `rows`, which starts at `rows_at` in
     /// the kernel's table.
     pub fn numbers(&self, rows: &mut Vec<f32>, rows_at: usize) -> [f32; 4] {
-        match self.kind.as_str() {
-            "henyey_greenstein" => [0.0, self.g as f32, self.g as f32, 1.0],
-            "two_term_henyey_greenstein" => [0.0, self.g1 as f32, self.g2 as f32, self.weight as f32],
-            "rayleigh" => [1.0, 0.0, 0.0, 1.0],
+        let (kind, [a, b, c]) = match self.kind.as_str() {
+            "henyey_greenstein" => (PhaseKind::Lobes, [self.g as f32, self.g as f32, 1.0]),
+            "two_term_henyey_greenstein" => (PhaseKind::Lobes, [self.g1 as f32, self.g2 as f32, self.weight as f32]),
+            "rayleigh" => (PhaseKind::Rayleigh, [0.0, 0.0, 1.0]),
             "tabulated" => {
                 let first = rows_at + rows.len();
                 let count = self.tabulate(rows);
-                [2.0, first as f32, count as f32, 1.0]
+                (PhaseKind::Table, [first as f32, count as f32, 1.0])
             }
-            _ => [0.0, 0.0, 0.0, 1.0],
-        }
+            _ => (PhaseKind::Lobes, [0.0, 0.0, 1.0]),
+        };
+        [kind.number() as f32, a, b, c]
     }
 
     /// Appends rows of cosine, normalised density and cumulative probability, and returns their number.

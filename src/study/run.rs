@@ -12,6 +12,7 @@ use super::{Case, Scale, Setting, Trial, Truth, fit, measure};
 use crate::chart::plain;
 use crate::error::Result;
 use crate::power_law::PowerLaw;
+use crate::technique::{self, Kind, Work};
 
 /// The errors of the table of the fastest settings.
 pub const ERRORS: [f64; 3] = [0.1, 0.01, 0.001];
@@ -116,8 +117,8 @@ fn point(bench: &Bench, setting: &Setting, truth: &Truth, scale: Scale) -> Resul
     bench.run(&small(&request), setting.reads)?;
     let mut run = |seed: usize| -> Result<Run> {
         request["seed"] = json!(seed);
-        if let Some(simulation) = request.pointer_mut("/volume/photon_transport") {
-            simulation["seed"] = json!(seed);
+        if let Some((_, field)) = field_of(&mut request) {
+            field["seed"] = json!(seed);
         }
         bench.run(&request, setting.reads)
     };
@@ -149,13 +150,22 @@ fn point(bench: &Bench, setting: &Setting, truth: &Truth, scale: Scale) -> Resul
     })
 }
 
+/// The parameters of a request's field, and of which of them there may be more or less.
+fn field_of(request: &mut serde_json::Value) -> Option<(Work, &mut serde_json::Value)> {
+    let (technique, work) = technique::fields().find_map(|t| match t.kind {
+        Kind::Field { work, .. } if request["volume"].get(t.name).is_some() => Some((t, work)),
+        _ => None,
+    })?;
+    request["volume"].get_mut(technique.name).map(|own| (work, own))
+}
+
 /// The same request with next to no work in it. It compiles the kernels that the request needs.
 fn small(request: &serde_json::Value) -> serde_json::Value {
     let mut small = request.clone();
     small["image"] = json!({"width": 8, "height": 8});
     small["budget"] = json!({"samples": 1});
-    if let Some(simulation) = small.pointer_mut("/volume/photon_transport") {
-        simulation["photons"] = json!(1000);
+    if let Some((work, field)) = field_of(&mut small) {
+        field[work.of] = json!(work.first.min(1000));
     }
     small
 }

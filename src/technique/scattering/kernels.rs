@@ -92,7 +92,7 @@ mod tests {
         assert!(said.contains("volume_path DENSITY=0 TRACKING=1 INTERPOLATION=0"), "{said}");
     }
 
-    /// The scene numbers kinds by itself; the kernels know the enums' numbers.
+    /// A light or a phase function of a type has the number that kernels know its kind by.
     #[test]
     fn kinds_of_lights_and_phases_are_the_devices() {
         let lights = json!([{"type": "sun"}, {"type": "point", "position": [0, 0, 1]},
