@@ -1,14 +1,14 @@
-//! `./dev compare OLD [NEW [NAME]]`: sends every request of `tests/requests/` to two builds of the server and tells what differs in their
-//! replies. OLD and NEW are server binaries; without NEW it is that of this folder. With NAME only the entries are sent whose name has it
-//! as a part.
+//! `./dev compare OLD [NEW [NAME]]`: sends every request of `tests/requests/` to two builds of the server and reports the differences of their
+//! replies. OLD and NEW are server binaries; without NEW, the second one is the binary of this folder. With NAME, only the entries are sent whose
+//! name contains it.
 //!
-//! Statuses, headers, pictures, grids and JSON have to agree to the byte; an EXR agrees in its values and words, for its blocks come in
-//! any order. Times and ids are left out, and so are the texts that are for people: `detail`, `message`, `failure` and reasons, of which
-//! only the number is compared. Of a reply that depends on measured times (`"compare": "shape"`) only the fields and their types are
-//! compared, and of one that is made of such times (`"compare": "head"`) only the status and the headers.
+//! Statuses, headers, pictures, grids and JSON have to agree to the byte. An EXR has to agree in its values and words, since its blocks come in any
+//! order. Times and ids are left out, and so are the texts for people: `detail`, `message`, `failure` and reasons, of which only the number is
+//! compared. If a reply depends on measured times (`"compare": "shape"`), only the fields and their types are compared. If it consists of such
+//! times (`"compare": "head"`), only the status and the headers are compared.
 //!
-//! An entry whose reply is changed on purpose says so: `"changed": "why, and in which way"`. Its differences are listed apart.
-//! A difference of any other entry makes the program end with 1.
+//! An entry whose reply is changed on purpose says so: `"changed": "why, and in which way"`. Its differences are listed apart. A difference in any
+//! other entry makes the program end with 1.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a benchmark says what is wrong by panicking")]
 
@@ -38,22 +38,22 @@ use side::Side;
 
 /// The binary of this folder, which cargo builds with this program.
 const NEW: &str = env!("CARGO_BIN_EXE_cloudchamber");
-/// An answer that differs in more places than these is told in part.
+/// The number of differences of an answer beyond which only some are told.
 const MOST_TOLD: usize = 6;
 
-/// What was found.
+/// The findings.
 #[derive(Default)]
 struct Found {
-    /// Entries and milliseconds by file.
+    /// The entries and milliseconds by file.
     files: BTreeMap<String, (usize, u128)>,
-    /// Lines by kind of difference: not expected, and expected.
+    /// The lines by kind of difference: not expected, and expected.
     differ: Vec<String>,
     changed: Vec<String>,
-    /// Entries that are said to be changed and are not.
+    /// The entries that are said to be changed and are not.
     same: Vec<String>,
 }
 
-/// Tells in one line each how two lists of replies differ.
+/// The differences of two lists of replies, in a line each.
 fn told(name: &str, [old, new]: [&[Reply]; 2]) -> Vec<String> {
     let mut lines = Vec::new();
     for (a, b) in old.iter().zip(new) {
@@ -82,7 +82,7 @@ impl Found {
         self.changed.extend(lines.into_iter().map(|line| format!("{line} ({why})")));
     }
 
-    /// Prints what was found; true if nothing differs that should not.
+    /// Prints the findings. True if nothing differs that should not.
     fn report(&self) -> bool {
         for (title, lines) in
             [("changed on purpose", &self.changed), ("said to be changed, and the same in both", &self.same)]
@@ -102,7 +102,7 @@ impl Found {
 }
 
 fn main() -> ExitCode {
-    // Cargo says `--bench` to a benchmark.
+    // Cargo passes `--bench` to a benchmark.
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
     let Some(old) = arguments.first() else {
         eprintln!("usage: ./dev compare OLD [NEW [NAME]]");

@@ -1,4 +1,4 @@
-//! `./dev bench delivery`: what a frame costs beyond its device time, one client, no data needed. Prints Markdown.
+//! `./dev bench delivery`: the cost of a frame beyond its device time, with one client; it needs no data. Prints Markdown.
 //!
 //! `SIDES=512,1024` measures other sizes, `PICTURES=folder` keeps a frame of each.
 
@@ -12,10 +12,10 @@ use std::time::Instant;
 use common::Server;
 use serde_json::{Value, json};
 
-/// Frames of a full turn.
+/// The number of frames of a full turn.
 const FRAMES: usize = 25;
 
-/// What a client asks for.
+/// The way in which a client asks for frames.
 #[derive(Clone, Copy)]
 enum Way {
     /// A render of its own for each frame: `POST` with `Accept: image/png`.
@@ -63,7 +63,7 @@ impl Client {
         format!("{}{path}", self.server.url())
     }
 
-    /// Sends the requests one after the other; the last reply is the picture.
+    /// Sends the requests one after the other. The last reply is the picture.
     fn picture(&self, requests: Vec<reqwest::RequestBuilder>) -> (Delivered, Vec<u8>) {
         let started = Instant::now();
         let (headers, png) = self.runtime.block_on(async {

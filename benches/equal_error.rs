@@ -1,9 +1,10 @@
-//! `./dev bench equal_error`: time for equal error. VTK's CPU ray caster draws volumes at one voxel a step; of our settings the fastest counts whose
-//! picture is wrong by no more. Prints Markdown, and puts a chart of each beside those of the study (`CHARTS=folder`, else the data folder's).
+//! `./dev bench equal_error`: time for equal error. VTK's CPU ray caster draws volumes at one voxel a step. Of our settings, the fastest counts
+//! whose picture has no greater error. Prints Markdown, and puts a chart of each beside those of the study (`CHARTS=folder`, else the data
+//! folder's).
 //!
-//! The truth is our own picture of a tenth of a voxel and 64 places in each pixel, in linear floats: VTK's own goes elsewhere with shorter steps, since
-//! it adds up in 15 bits. What a common factor would mend is not counted against VTK, so that how the two light does not matter.
-//! The synthetic volume, and those of `SCANS`, files separated by `:` of bytes as voxels.
+//! The truth is our own picture with steps of a tenth of a voxel and 64 places in each pixel, in linear floats: with shorter steps, VTK's own
+//! picture converges elsewhere, since it sums in 15 bits. A common factor is not counted against VTK's picture, so that a difference in lighting
+//! does not matter. The volumes are the synthetic one, and those of `SCANS`, files separated by `:` with bytes as voxels.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a benchmark says what is wrong by panicking")]
 
@@ -24,7 +25,7 @@ use cloudchamber::volume::{RawQuery, Volume, Voxels};
 use scenes::{FRAMES, SIDE, list, median, modes, synthetic, vtk};
 use serde_json::{Value, json};
 
-/// Steps that are tried, in voxels.
+/// The steps that are tried, in voxels.
 const STEPS: [f64; 9] = [0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 8.0, 16.0];
 const PIXELS: usize = 512;
 
@@ -36,7 +37,7 @@ struct Flags {
     limits: Limits,
 }
 
-/// A volume of bytes, and how it is looked at.
+/// A volume of bytes, with its size.
 struct Subject {
     name: String,
     bytes: Vec<u8>,
@@ -62,7 +63,7 @@ impl Subject {
         self.spacing.into_iter().fold(f64::INFINITY, f64::min)
     }
 
-    /// From the eye to the middle of the turn's axis.
+    /// The distance from the eye to the middle of the turn's axis.
     fn distance(&self) -> f64 {
         let sides = self.dims.iter().zip(self.spacing).map(|(n, s)| *n as f64 * s);
         1.8 * sides.fold(0.0, f64::max)
@@ -78,7 +79,7 @@ impl Subject {
         json!({"id": bench.assets().volumes().insert(self.bytes.clone(), &self.name, query.parse().unwrap()).unwrap().1})
     }
 
-    /// Parameters of a mode of `scenes`, whose opacities are for the synthetic volume's voxels.
+    /// The parameters of a mode of `scenes`, whose opacities are for the synthetic volume's voxels.
     fn own(&self, parameters: &Value) -> Value {
         let mut own = parameters.clone();
         let scale = 2.0 / SIDE as f64 / self.voxel();
@@ -95,7 +96,7 @@ impl Subject {
             "up": [0, 0, 1], "fov_y_deg": 30}, "budget": {"samples": samples}, "emission_absorption": own})
     }
 
-    /// Seconds of a frame of VTK's, and its luminance; none without VTK.
+    /// The seconds of a frame of VTK's, and its luminance; `None` without VTK.
     fn vtk(&self, mode: &str) -> Option<(f64, Vec<f64>)> {
         let folder = tempfile::tempdir().unwrap();
         let [raw, out] = ["volume.raw", "out.rgb"].map(|name| folder.path().join(name));
@@ -121,12 +122,12 @@ fn point(at: f64, ms: [f64; 2], error: Measured, run: Option<&Run>) -> Point {
         counts: run.map_or(Value::Null, |run| run.reply["counts"].clone()),
         warnings: Vec::new(),
         front: false,
-        // Of many points of a transfer function each: the benchmark has them.
+        // A request would repeat the many points of its transfer function, which are in the benchmark.
         request: Value::Null,
     }
 }
 
-/// Values times the factor that brings them closest to the truth.
+/// The values times the factor that brings them closest to the truth.
 fn fitted(values: &[f64], truth: &[f64]) -> Vec<f64> {
     let products: f64 = values.iter().zip(truth).map(|(v, t)| v * t).sum();
     let squares: f64 = values.iter().map(|v| v * v).sum();

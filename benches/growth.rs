@@ -1,5 +1,5 @@
-//! `./dev bench growth`: what a frame costs by volume size, image size and step, and what the macro-cells cost to build. Draws
-//! `docs/charts/cost_by_*.svg` and prints Markdown; the growth is the slope of log device time over the upper half of a line.
+//! `./dev bench growth`: the cost of a frame by volume size, image size and step, and the cost of building the macro-cells. Draws
+//! `docs/charts/cost_by_*.svg` and prints Markdown. The growth is the slope of log device time over the upper half of a line.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a benchmark says what is wrong by panicking")]
 
@@ -25,7 +25,7 @@ struct Line {
 }
 
 impl Line {
-    /// Slope of log y against log x over the last three points, by least squares.
+    /// The slope of log y against log x over the last three points, by least squares.
     fn growth(&self) -> f64 {
         let last: Vec<(f64, f64)> = self.points.iter().rev().take(3).map(|(x, y)| (x.ln(), y.ln())).collect();
         let n = last.len() as f64;
@@ -100,7 +100,7 @@ fn draw(file: &str, title: &str, x: &str, lines: &[Line]) {
     println!("| slope | {} |", growth.join(" | "));
 }
 
-/// What building the macro-cells of a 256³ byte volume costs, milliseconds.
+/// The time for building the macro-cells of a 256³ byte volume, milliseconds.
 fn cells() -> f64 {
     device::keep_compiled_kernels_in(&common::kernel_cache()).unwrap();
     let mut device = Device::open(&DeviceConfig::pocl()).unwrap();

@@ -1,5 +1,5 @@
-//! `./dev bench photons`: photon transport against MCX's OpenCL version on the same PoCL, in turns in one run; what each tracker and
-//! estimator makes of the same time; and the growth with threads. Prints Markdown. `DEVICE=gpu` measures another device.
+//! `./dev bench photons`: photon transport against MCX's OpenCL version on the same PoCL, in turns in one run; the error of each tracker and
+//! estimator in the same time; and the growth with threads. Prints Markdown. `DEVICE=gpu` measures another device.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a benchmark says what is wrong by panicking")]
 
@@ -14,14 +14,14 @@ use common::with;
 use posts::{Bench, median};
 use serde_json::{Value, json};
 
-/// What a simulation came to.
+/// The outcome of a simulation.
 struct Run {
     result: Value,
     photons_per_ms: f64,
     wall_per_ms: f64,
 }
 
-/// Posts the simulation and waits for its picture, then asks for the result, and for the grid where it is wanted.
+/// Posts the simulation and waits for its picture, then asks for the result, and for the grid if it is wanted.
 fn run_with_field(bench: &Bench, scene: &Value, wanted: bool) -> (Run, Vec<f32>) {
     let body = json!({"technique": "emission_absorption", "volume": {"photon_transport": scene},
         "image": {"width": 8, "height": 8}, "budget": {"samples": 1}});
@@ -85,7 +85,7 @@ fn mcx(scene: &str, photons: u64) -> Option<Value> {
     let python = concat!(env!("CARGO_MANIFEST_DIR"), "/target/bench-venv/bin/python");
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/mcx_photons.py");
     let output = Command::new(python).args([script, scene, &photons.to_string()]).output().ok()?;
-    // The module greets before the line that counts.
+    // The module prints a greeting before the line with the result.
     serde_json::from_slice(output.stdout.trim_ascii_end().rsplit(|b| *b == b'\n').next()?).ok()
 }
 
@@ -132,7 +132,7 @@ fn against_mcx(bench: &Bench) {
     }
 }
 
-/// What a setting makes of its time: the variance of a voxel times the time, relative to the first setting.
+/// The efficiency of a setting: the variance of a voxel times the time, relative to the first setting.
 fn settings(bench: &Bench) {
     println!(
         "\n| variance × time, relative to the default | {} |\n|---|---|---|---|---|---|---|",
@@ -159,7 +159,7 @@ fn settings(bench: &Bench) {
                     run.1
                 })
                 .collect();
-            // Variance of each voxel over the seeds, relative to the mean of the field, averaged over the voxels.
+            // The variance of each voxel over the seeds, relative to the mean of the field, averaged over the voxels.
             let n = grids[0].len();
             let mean_at = |i: usize| grids.iter().map(|g| f64::from(g[i])).sum::<f64>() / f64::from(fields);
             let mean = (0..n).map(mean_at).sum::<f64>() / n as f64;

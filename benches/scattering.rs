@@ -1,5 +1,5 @@
-//! `./dev bench scattering`: light in a volume against Mitsuba 3's volpath, in turns in one run; what each way of it makes of the same
-//! time; and how soon a first picture is there. Prints Markdown. `DEVICE=gpu` measures another device.
+//! `./dev bench scattering`: light in a volume against Mitsuba 3's volpath, in turns in one run; the error of each of our methods in the same time;
+//! and the time to a first picture. Prints Markdown. `DEVICE=gpu` measures another device.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a benchmark says what is wrong by panicking")]
 
@@ -13,7 +13,7 @@ use common::with;
 use posts::{Bench, median};
 use serde_json::{Value, json};
 
-/// What a render came to: its relative error, its mean luminance, and seconds on the device and until it was done.
+/// The outcome of a render: its relative error, its mean luminance, and the seconds on the device and until it was done.
 struct Run {
     error: f64,
     mean: f64,
@@ -63,7 +63,7 @@ fn scene(volume: &Value, own: &Value, samples: u32) -> Value {
         "camera": {"eye": [2.6, -3.0, 2.2], "target": [0, 0, 0], "up": [0, 0, 1], "fov_y_deg": 40}, "budget": {"samples": samples}})
 }
 
-/// The volume that VTK and Mitsuba are compared on.
+/// The volume on which VTK and Mitsuba are compared.
 fn ripples(x: f64, y: f64, z: f64) -> f64 {
     (-4.0 * (x * x + y * y + z * z)).exp() * (0.6 + 0.4 * (14.0 * x).sin() * (14.0 * y).sin() * (14.0 * z).sin())
 }
@@ -71,7 +71,7 @@ fn ripples(x: f64, y: f64, z: f64) -> f64 {
 fn mitsuba(scene: &str, samples: u32) -> Option<Value> {
     let python = concat!(env!("CARGO_MANIFEST_DIR"), "/target/bench-venv/bin/python");
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/mitsuba_cloud.py");
-    // A library that hides the processor's features from PoCL's LLVM (tests/physics/levels) is not for Mitsuba's.
+    // A library that hides the processor's features from PoCL's LLVM (tests/physics/levels) is not for Mitsuba's LLVM.
     let command = |python| {
         Command::new(python).env_remove("LD_PRELOAD").args([script, scene, &samples.to_string(), "4"]).output()
     };
@@ -137,11 +137,11 @@ const SETTINGS: [(&str, &str); 9] = [
     ("adaptive", r#"{"adaptive": true}"#),
 ];
 
-/// Variance × time of each setting, relative to the default.
+/// The variance × time of each setting, relative to the default.
 fn settings(bench: &Bench) {
     let names: Vec<&str> = SETTINGS.iter().map(|s| s.0).collect();
     println!("\n| variance × device time, relative | {} |\n|{}", names.join(" | "), "---|".repeat(1 + SETTINGS.len()));
-    // Suns of some width, so that they can also be met by chance.
+    // The suns have some width, so that they can also be met by chance.
     let wide = json!([{"type": "sun", "direction": [0.5, -0.6, 0.8], "irradiance": 3, "angular_diameter_deg": 30}, {"type": "sky", "radiance": 0.3}]);
     let lamp = json!([{"type": "sphere", "position": [1, -1, 1], "radius": 0.3, "radiance": 10}]);
     let shell =
@@ -170,7 +170,7 @@ fn settings(bench: &Bench) {
                 let setting: Value = serde_json::from_str(setting).unwrap();
                 let request = with(&scene(&volume, &with(&own, &setting), 96), &json!({"seed": seed}));
                 if seed == 0 {
-                    // Builds the kernel; its time does not count.
+                    // This run builds the kernel, and its time does not count.
                     run(bench, &request);
                 }
                 let run = run(bench, &request);

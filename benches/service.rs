@@ -1,4 +1,4 @@
-//! `./dev bench`: the numbers of the MRI head, all in one run on one machine, as medians and ratios. Prints Markdown.
+//! `./dev bench`: the numbers of the MRI head, all from one run on one machine, as medians and ratios. Prints Markdown.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a benchmark says what is wrong by panicking")]
 
@@ -33,7 +33,7 @@ struct Bench {
     volume: String,
 }
 
-/// One delivered frame: seconds until all bytes were here, the device's and the server's part of it, and the bytes.
+/// One delivered frame: the seconds until all bytes were here, the device's and the server's part of them, and the bytes.
 struct Delivered {
     wall_s: f64,
     device_s: f64,
@@ -70,7 +70,7 @@ impl Bench {
         }
     }
 
-    /// A full turn, one pass a frame, after one frame of warm-up.
+    /// A full turn, with one pass per frame, after one frame of warm-up.
     fn turn(&self, parameters: &Value) -> Vec<Delivered> {
         self.frame(&scene(&self.volume, 0, 1, parameters.clone()));
         (0..FRAMES).map(|i| self.frame(&scene(&self.volume, i, 1, parameters.clone()))).collect()
@@ -93,7 +93,7 @@ fn difference(a: &[u8], b: &[u8]) -> u8 {
     open(a).iter().zip(open(b)).map(|(a, b)| a.abs_diff(b)).max().unwrap()
 }
 
-/// Seconds for all samples of the frame's rays, were eight loads each all there is, at two a cycle on every core.
+/// The seconds for all samples of the frame's rays if eight loads each were all the work, at two a cycle on every core.
 fn floor_s(device: &Value) -> f64 {
     let half = glam::dvec3(90.5, 108.5, 90.5);
     let eye = glam::dvec3(0.0, -390.0, 130.0);

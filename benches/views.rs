@@ -29,7 +29,7 @@ fn main() {
         let mut theirs = Vec::new();
         let mut ours = Vec::new();
         client.frame(&scene(&volume, 0, technique, &parameters));
-        // In turns, so that a noisy neighbour troubles both.
+        // The two take turns, so that a noisy neighbour troubles both.
         for _ in 0..3 {
             ours.extend((0..FRAMES).map(|i| client.frame(&scene(&volume, i, technique, &parameters))));
             theirs.extend((!no_vtk).then(|| vtk(&path, [SIDE; 3], [2.0 / SIDE as f64; 3], 3.6, mode, None)).flatten());

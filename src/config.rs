@@ -1,4 +1,4 @@
-//! The command line and the environment (`CLOUDCHAMBER_…`) as one [`Config`]; every limit of the service stands here.
+//! The command line and the environment (`CLOUDCHAMBER_…`) as one [`Config`]. Every limit of the service is here.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -10,7 +10,7 @@ use crate::asset::AssetLimits;
 use crate::device::DeviceConfig;
 use crate::volume::VolumeLimits;
 
-/// Kernels address voxels by 32-bit byte offsets.
+/// The largest volume, bytes: kernels address voxels by 32-bit byte offsets.
 const LARGEST_VOLUME: u64 = (1 << 31) - 16;
 
 /// Where things are kept and which device is used: shared by `serve`, `render` and `device`.
@@ -52,7 +52,7 @@ impl DeviceArgs {
         self.data_dir.clone().unwrap_or_else(|| base().join("cloudchamber"))
     }
 
-    /// What `device/` needs of this.
+    /// The configuration for `device/`.
     pub fn device_config(&self) -> DeviceConfig {
         DeviceConfig {
             target: self.device.clone(),
@@ -116,12 +116,12 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// The limits that the readers of volume files keep.
+    /// The limits for the readers of volume files.
     pub fn volume(&self) -> VolumeLimits {
         VolumeLimits { max_volume_bytes: self.max_volume_bytes, max_side: 4096 }
     }
 
-    /// The limits that stored things keep.
+    /// The limits for the stores.
     pub fn assets(&self) -> AssetLimits {
         AssetLimits {
             volume: self.volume(),
@@ -167,7 +167,7 @@ pub struct Config {
 }
 
 impl Config {
-    /// Time that running renders get after SIGTERM.
+    /// The time that running renders get after SIGTERM.
     pub fn drain(&self) -> Duration {
         Duration::from_millis(self.drain_ms)
     }

@@ -1,15 +1,15 @@
-//! One error type for the whole house, and the one place where a status code is chosen.
+//! One error type for the whole program, and the one place that chooses a status code.
 
 use std::fmt;
 
-/// One thing wrong with a request: where, what, and what would be right.
+/// One fault of a request, with its place and the permitted values.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Violation {
-    /// JSON pointer (RFC 6901) to the offending field, `""` for the whole body; `query:NAME` for a query parameter.
+    /// The JSON pointer (RFC 6901) to the offending field, `""` for the whole body; `query:NAME` for a query parameter.
     pub pointer: String,
-    /// What is wrong, in words for the sender.
+    /// The fault, in words for the sender.
     pub detail: String,
-    /// The permitted range or values, where there is one.
+    /// The permitted range or values, if there are any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub permitted: Option<String>,
 }
@@ -32,16 +32,16 @@ impl fmt::Display for Violation {
     }
 }
 
-/// Everything that can go wrong, as the sender of a request needs to know it.
+/// All errors, as the sender of a request needs to know them.
 #[derive(Debug, Clone, thiserror::Error)]
 pub enum Error {
-    /// The body is not what its content type says (bad JSON, a bad header).
+    /// The body does not match its content type (bad JSON, a bad header).
     #[error("{0}")]
     Malformed(String),
-    /// A bearer token is asked for and was not given, or is wrong.
+    /// A bearer token is required. It was not given, or it is wrong.
     #[error("a valid bearer token is required")]
     Unauthorized,
-    /// No such thing.
+    /// There is no such thing.
     #[error("there is no {what} '{id}'")]
     NotFound {
         /// The kind of thing, such as `render`.
@@ -49,7 +49,7 @@ pub enum Error {
         /// The id asked for.
         id: String,
     },
-    /// The path exists, the method does not.
+    /// The path exists, but it does not take the method.
     #[error("this path does not take that method")]
     MethodNotAllowed,
     /// None of the media types in `Accept` can be made.
@@ -64,34 +64,34 @@ pub enum Error {
     /// Something is larger than a limit of the configuration.
     #[error("{what} is larger than the limit of {limit}")]
     TooLarge {
-        /// What is too large.
+        /// The thing that is too large.
         what: String,
         /// The limit, with its unit.
         limit: String,
     },
-    /// The content type is not one that this path reads.
+    /// This path does not read the content type.
     #[error("{0}")]
     UnsupportedMediaType(String),
-    /// The body is well formed and means something that cannot be done.
+    /// The body is well formed but asks for something that cannot be done.
     #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))]
     Invalid(Vec<Violation>),
     /// The queue is full.
     #[error("the queue is full: {waiting} renders wait; try again in {retry_after_s} s")]
     QueueFull {
-        /// Unfinished renders held now.
+        /// The number of unfinished renders.
         waiting: usize,
-        /// Seconds after which a place is likely.
+        /// The seconds after which a place is likely.
         retry_after_s: u64,
     },
     /// Too many streams are open.
     #[error("{open} streams are open, which is the limit; try again in {retry_after_s} s")]
     StreamsFull {
-        /// Streams open now.
+        /// The number of open streams.
         open: usize,
-        /// Seconds after which a place is likely.
+        /// The seconds after which a place is likely.
         retry_after_s: u64,
     },
-    /// A kernel does not build on this device: what needs it cannot be had here, everything else can.
+    /// A kernel does not build on this device. Requests that need it are refused, and all others are served.
     #[error(
         "the kernel '{variant}' does not build on this device with {lanes} lanes, so what needs it cannot be rendered here; everything \
         else can. Another technique or option may do, or a server that is started with other --lanes or another --device; its log has the compiler's words"
@@ -99,13 +99,13 @@ pub enum Error {
     Kernel {
         /// The kernel's name and features.
         variant: String,
-        /// Lanes that it was built for.
+        /// The lanes that it was built for.
         lanes: u32,
     },
     /// The service is starting or draining.
     #[error("{0}")]
     Unavailable(String),
-    /// Our fault. The text goes to the log; the client is told only that it happened.
+    /// A fault of the server. The text goes to the log; a client learns only that it happened.
     #[error("{0}")]
     Internal(String),
 }
@@ -116,7 +116,7 @@ impl Error {
         Self::Invalid(vec![Violation::new(pointer, detail, permitted)])
     }
 
-    /// The same with other pointers, for those that `other` gives one for.
+    /// The same error with other pointers. Those for which `other` gives none are kept.
     #[must_use]
     pub fn with_pointers(self, other: impl Fn(&str) -> Option<String>) -> Self {
         let Self::Invalid(violations) = self else { return self };
@@ -129,7 +129,7 @@ impl Error {
         Self::Internal(cause.to_string())
     }
 
-    /// The HTTP status and the title of this error: the only place where either is chosen.
+    /// The HTTP status and the title of this error. Both are chosen only here.
     pub fn status(&self) -> (u16, &'static str) {
         match self {
             Self::Malformed(_) => (400, "Malformed request"),

@@ -1,19 +1,19 @@
-//! Cloudchamber: a server that renders volumes and shows how accurate each picture is and what it cost.
+//! Cloudchamber: a server that renders volumes and shows the accuracy and the cost of each picture.
 //!
 //! ```text
 //! HTTP body ─► request ─► render ─► job ─► run ─► device ─► film | field ─► frame ─► HTTP stream
 //!            (wire JSON) (valid) (record) (slices) (OpenCL)  (sums)        (PNG)
 //! ```
 //!
-//! The data goes one way, and modules use each other the other way: `command` → `http` → `study` → `service` → `plan` and `run` → `job` →
-//! `render` → `technique` → `scene` → `request` → `config` → `device` → `film` → `frame` → `asset` → `volume` → `error`, never back and never in a circle
+//! The data goes one way, and modules use each other the other way: `command` → `http` → `study` → `service` → `plan` and `run` → `job` → `render`
+//! → `technique` → `scene` → `request` → `config` → `device` → `film` → `frame` → `asset` → `volume` → `error`, never back and never in a circle
 //! (`tests/service/house.rs`). `docs/architecture.md` walks one request and one field through the files.
 //!
-//! | module | what it is |
+//! | module | contents |
 //! |---|---|
 //! | [`command`] | the command line: a file a command, and its side of the HTTP contract |
 //! | [`http`] | routes, content negotiation, problem details, streams, OpenAPI; no physics |
-//! | [`study`] | speed against accuracy: cases with a truth, measured |
+//! | [`study`] | measurements of speed against accuracy, by cases with a truth |
 //! | [`service`] | the service in one object: engine, volumes, limits, planner; one way to submit a render |
 //! | [`plan`] | the planner: the cheapest setting that is accurate enough, or the best in a time, with reasons |
 //! | [`run`] | the device thread: stages of a run, fair slices, passes, kernels compiled beside it |
@@ -27,13 +27,13 @@
 //! | [`device`] | the only home of OpenCL and of `unsafe`: context, programs, buffers, bounded launches |
 //! | [`film`] | sums on the host: picture and error |
 //! | [`frame`] | picture to PNG or EXR, with its metadata |
-//! | [`asset`] | what is stored, by the hash of its content: volumes |
+//! | [`asset`] | stored things, by the hash of their content: volumes |
 //! | [`volume`] | grids: readers, built-ins |
 //! | [`power_law`] | lines on logarithmic axes |
-//! | [`error`] | one error enum; the one place where a status code is chosen |
+//! | [`error`] | one error enum; the one place that chooses a status code |
 //!
-//! Kernels: `kernels/<technique>.cl` and `kernels/shared/`. The viewer: `static/`. Tests: `tests/physics/<technique>.rs`
-//! in this process, `tests/service/{api,stream,faults,viewer,…}.rs` against the real binary. `docs/add-a-technique.md` says how to add one.
+//! Kernels: `kernels/<technique>.cl` and `kernels/shared/`. The viewer: `static/`. Tests: `tests/physics/<technique>.rs` in this process,
+//! `tests/service/{api,stream,faults,viewer,…}.rs` against the real binary. `docs/add-a-technique.md` explains how to add a technique.
 
 pub mod asset;
 pub mod chart;

@@ -37,7 +37,7 @@ pub struct Prepared {
 }
 
 impl Service {
-    /// Opens what is stored in `data_dir` and starts the engine. Must be called within a tokio runtime.
+    /// Opens the stores in `data_dir` and starts the engine. It must be called within a tokio runtime.
     ///
     /// # Errors
     /// [`Error::Internal`] when the folder cannot be used or no thread can be started.
@@ -53,7 +53,7 @@ impl Service {
         &self.shared.engine
     }
 
-    /// What is stored.
+    /// The stored things.
     pub fn assets(&self) -> &Assets {
         &self.shared.assets
     }
@@ -77,7 +77,7 @@ impl Service {
         Scene::from_json(request, self.assets(), self.limits())
     }
 
-    /// Plans a request where its technique is `auto`, takes a place in the queue, checks the request and loads its volume.
+    /// Plans a request if its technique is `auto`, takes a place in the queue, checks the request and loads its volume.
     ///
     /// # Errors
     /// Those of the planner, of [`Engine::reserve`] and of [`Service::scene`].
@@ -89,7 +89,7 @@ impl Service {
         .await
     }
 
-    /// Takes a place in the queue, checks the request of an export and loads what it names.
+    /// Takes a place in the queue, checks the request of an export and loads its volume.
     ///
     /// # Errors
     /// Those of [`Engine::reserve`] and of [`ExportTask::from_json`].
@@ -106,7 +106,7 @@ impl Service {
         planned: Option<Value>,
         task: impl FnOnce(&Self, &Value) -> Result<Task> + Send + 'static,
     ) -> Result<Prepared> {
-        // A place in the queue before anything is loaded for the request.
+        // A place in the queue is taken before anything is loaded for the request.
         let place = self.engine().reserve()?;
         // The runtime's own threads must not wait until a volume is decoded or a built-in is made.
         let service = self.clone();
@@ -132,7 +132,7 @@ impl Service {
     /// Submits a request and waits for its end. It is cancelled when this future is dropped.
     ///
     /// # Errors
-    /// As [`Service::prepare`], and what the render failed by.
+    /// As [`Service::prepare`], and the error by which the render failed.
     pub async fn submit_and_wait(&self, request: Value) -> Result<Arc<Job>> {
         let job = self.submit(request).await?;
         self.wait(job).await
@@ -141,7 +141,7 @@ impl Service {
     /// Submits the request of an export and waits for its end. It is cancelled when this future is dropped.
     ///
     /// # Errors
-    /// As [`Service::prepare_export`], and what the export failed by.
+    /// As [`Service::prepare_export`], and the error by which the export failed.
     pub async fn export_and_wait(&self, request: Value) -> Result<Arc<Job>> {
         let job = self.queue(self.prepare_export(request).await?);
         self.wait(job).await

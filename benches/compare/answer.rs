@@ -1,22 +1,22 @@
-//! What a server answers, and how much of it is compared.
+//! The answers of a server, and the compared part of each.
 
 use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-/// How much of a reply is compared.
+/// The compared part of a reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Compare {
     /// All of it but times, ids and texts for people.
     All,
-    /// The fields and their types, for they depend on measured times.
+    /// The fields and their types, since they depend on measured times.
     Shape,
     /// The status and the headers.
     Head,
 }
 
 impl Compare {
-    /// What an entry or a call says of itself.
+    /// The part that an entry or a call asks for.
     pub fn of(said: &Value) -> Self {
         match said["compare"].as_str() {
             None => Self::All,
@@ -26,7 +26,7 @@ impl Compare {
         }
     }
 
-    /// The same for a reply that is no JSON: it has no shape.
+    /// The part for a reply that is no JSON, since that has no shape.
     pub fn of_bytes(self) -> Self {
         if self == Self::Shape { Self::Head } else { self }
     }
@@ -37,11 +37,11 @@ impl Compare {
 pub struct Reply {
     /// The method and the path, as the list has them.
     pub label: String,
-    /// How much of it is compared.
+    /// The part of it that is compared.
     pub compare: Compare,
-    /// 0 where there was no answer; the body then says why.
+    /// The status, or 0 if there was no answer; the body then has the reason.
     pub status: u16,
-    /// By name, with ids and times left out.
+    /// The headers by name, with ids and times left out.
     pub headers: BTreeMap<String, String>,
     pub body: Vec<u8>,
 }
@@ -53,7 +53,7 @@ impl Reply {
         declared.split(';').next().unwrap_or_default().trim()
     }
 
-    /// The body as JSON, where it says that it is.
+    /// The body as JSON, if its content type says that it is.
     pub fn json(&self) -> Option<Value> {
         let media = self.media();
         let is_json = media == "application/json" || media.ends_with("+json");

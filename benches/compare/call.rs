@@ -7,14 +7,14 @@ use serde_json::{Value, json};
 use super::answer::Compare;
 use crate::common::pictures;
 
-/// What stands for names in paths, headers and JSON: `{u8}` for the id of a test volume, `{0}` for that of the entry's first render, `{last}`
-/// for the one that was told last.
+/// The values of names in paths, headers and JSON: `{u8}` is the id of a test volume, `{0}` that of the entry's first render, and `{last}` the last
+/// id of a reply.
 pub type Names = BTreeMap<String, String>;
 
 /// A call.
 pub struct Call {
     pub method: reqwest::Method,
-    /// As the list has it.
+    /// The method and the path, as the list has them.
     pub label: String,
     pub path: String,
     pub headers: Vec<(String, String)>,
@@ -22,18 +22,18 @@ pub struct Call {
     pub compare: Compare,
 }
 
-/// The text with what its names stand for.
+/// The text with its names replaced by their values.
 fn filled(text: &str, names: &Names) -> String {
     names.iter().fold(text.to_owned(), |text, (name, id)| text.replace(&format!("{{{name}}}"), id))
 }
 
-/// Bytes that are 0 but for those `at` places that are given in hexadecimal digits.
+/// Bytes that are 0 except at the places `at`, which are given in hexadecimal digits.
 fn sparse(bytes: &Value) -> Vec<u8> {
     let mut made = vec![0; bytes["length"].as_u64().unwrap() as usize];
     for (at, digits) in bytes["at"].as_object().into_iter().flatten() {
         let (at, digits) = (at.parse::<usize>().unwrap(), digits.as_str().unwrap());
         for (i, pair) in digits.as_bytes().chunks(2).enumerate() {
-            // What is beyond the end of a file that is cut short is cut off.
+            // The bytes beyond the end of a file that is cut short are left out.
             if let Some(byte) = made.get_mut(at + i) {
                 *byte = u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap();
             }
@@ -43,8 +43,8 @@ fn sparse(bytes: &Value) -> Vec<u8> {
 }
 
 impl Call {
-    /// Reads a call of the list: `path`, and where they are needed `method`, `headers`, `compare` and a body as `json`, `text` or `bytes`.
-    /// With a body it is a POST, else a GET.
+    /// Reads a call of the list: `path`, and if necessary `method`, `headers`, `compare` and a body as `json`, `text` or `bytes`. With a body it is
+    /// a POST, else a GET.
     pub fn new(said: &Value, names: &Names) -> Self {
         let json = said.get("json").map(|json| {
             let json = pictures::with_ids(json, &|name| names[name].clone());

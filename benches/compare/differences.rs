@@ -1,4 +1,4 @@
-//! How two replies differ, each difference in a line.
+//! The differences of two replies, each in a line.
 
 use std::collections::BTreeSet;
 
@@ -7,9 +7,9 @@ use serde_json::Value;
 use super::answer::{Compare, Reply};
 use super::formats;
 
-/// As much of a value as a line has room for.
+/// The number of characters of a value for which a line has room.
 const SHOWN: usize = 90;
-/// What a plan may choose otherwise from run to run.
+/// The parts of a plan that may differ from run to run.
 const CHOSEN: [&str; 2] = ["request", "options"];
 
 fn shown(value: &str) -> String {
@@ -28,7 +28,7 @@ pub fn of(old: &Reply, new: &Reply) -> Vec<String> {
     let names: BTreeSet<&String> = old.headers.keys().chain(new.headers.keys()).collect();
     for name in names {
         let [a, b] = [old, new].map(|reply| reply.headers.get(name).map_or("none", String::as_str));
-        // The tag is told by the body. Of a picture that depends on measured times the error does too.
+        // The body determines the tag. If a picture depends on measured times, its error does too.
         let is_of_body = name == "etag" || (name.starts_with("x-cloudchamber-") && old.compare == Compare::Head);
         if a != b && !is_of_body {
             found.push(format!("header {name}: {}, now {}", shown(a), shown(b)));
@@ -44,7 +44,7 @@ pub fn of(old: &Reply, new: &Reply) -> Vec<String> {
     found
 }
 
-/// Walks through two values and tells where they differ, by JSON pointer.
+/// Walks through two values and collects their differences, by JSON pointer.
 pub fn walk(at: &str, old: &Value, new: &Value, found: &mut Vec<String>) {
     match (old, new) {
         (Value::Object(a), Value::Object(b)) => {
@@ -69,7 +69,7 @@ pub fn walk(at: &str, old: &Value, new: &Value, found: &mut Vec<String>) {
     }
 }
 
-/// Tells where fields or their types differ. What may be missing is of any type, and what a plan chose of any shape.
+/// Collects the fields that differ, or whose types differ. A field that may be missing is of any type, and one that a plan chose is of any shape.
 fn walk_shapes(at: &str, old: &Value, new: &Value, found: &mut Vec<String>) {
     let kind = |value: &Value| match value {
         Value::Null => "null",

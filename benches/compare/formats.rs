@@ -1,4 +1,4 @@
-//! How two bodies differ whose bytes are not the same: by pixels and values, where their format is known.
+//! The differences of two bodies whose bytes are not the same: by pixels and values, if their format is known.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::differences::walk;
 
-/// Differences of two bodies of a media type.
+/// The differences of two bodies of a media type.
 pub fn differences(media: &str, old: &[u8], new: &[u8]) -> Vec<String> {
     let told = match media {
         "image/png" => png(old, new),
@@ -15,7 +15,7 @@ pub fn differences(media: &str, old: &[u8], new: &[u8]) -> Vec<String> {
         _ => text(old, new),
     };
     match told {
-        // The blocks of an EXR stand in the order in which they were compressed, several at a time.
+        // The blocks of an EXR have the order in which they were compressed, several at a time.
         Some(told) if told.is_empty() && media == "image/x-exr" => told,
         Some(told) if told.is_empty() => vec![format!("the same {media}, in other bytes")],
         Some(told) => told,
@@ -23,7 +23,7 @@ pub fn differences(media: &str, old: &[u8], new: &[u8]) -> Vec<String> {
     }
 }
 
-/// How many values differ, and by how much at most.
+/// The number of values that differ, and their greatest difference.
 fn apart(what: &str, old: &[f64], new: &[f64]) -> Option<String> {
     if old.len() != new.len() {
         return Some(format!("{what}: {} values, now {}", old.len(), new.len()));
@@ -46,11 +46,11 @@ fn png(old: &[u8], new: &[u8]) -> Option<Vec<String>> {
     Some(told)
 }
 
-/// What an EXR holds.
+/// The contents of an EXR.
 struct Film {
     /// The values of its channels, by name.
     channels: BTreeMap<String, Vec<f64>>,
-    /// What it says of itself in its comments.
+    /// The description in its comments.
     words: Value,
     /// Its other attributes.
     others: String,

@@ -1,10 +1,10 @@
-//! Leaves out of a reply what differs from run to run: ids, times, and the texts that are for people.
+//! Leaves out the parts of a reply that differ from run to run: ids, times, and the texts for people.
 
 use serde_json::{Value, json};
 
 use super::answer::Reply;
 
-/// Headers that say when, how long and how large.
+/// The headers with times, durations and sizes.
 const HEADERS: [&str; 6] = [
     "date",
     "content-length",
@@ -15,7 +15,7 @@ const HEADERS: [&str; 6] = [
 ];
 /// Texts for people.
 const TEXTS: [&str; 4] = ["detail", "message", "failure", "tracking_reason"];
-/// Lists of them.
+/// Lists of texts for people.
 const LISTS_OF_TEXTS: [&str; 1] = ["reasons"];
 
 /// A header's value, if it is compared.
@@ -42,12 +42,12 @@ pub fn body(reply: &Reply, renders: &[String]) -> Vec<u8> {
     }
 }
 
-/// Tells if a field says when or how long. A budget's time is what was asked for.
+/// True if a field has a time or a duration. A budget's time is part of the request and stays.
 fn is_time(key: &str) -> bool {
     (key.ends_with("_ms") && key != "time_ms") || ["created_unix_s", "trace_slope", "photons_per_ms"].contains(&key)
 }
 
-/// The value of a field without times and texts. Of a trace, whose points are as many as there was time for, the last stays.
+/// The value of a field without times and texts. Of a trace, only the last point stays, since the number of points depends on the time.
 fn masked(key: &str, value: &Value) -> Value {
     match value {
         _ if is_time(key) => json!("a time"),
@@ -57,7 +57,7 @@ fn masked(key: &str, value: &Value) -> Value {
         Value::Array(items) => {
             let mut items: Vec<Value> = items.iter().map(|v| masked("", v)).collect();
             if key == "volumes" {
-                // Those that came in the same second are in no order.
+                // Entries that came in the same second are in no order.
                 items.sort_by_key(|v| v["reference"].to_string());
             }
             Value::Array(items)
@@ -67,7 +67,7 @@ fn masked(key: &str, value: &Value) -> Value {
     }
 }
 
-/// Server-sent events without the numbers of frames, which are as many as there was time for.
+/// Server-sent events without the numbers of frames, which depend on the time.
 fn events(text: &str) -> String {
     let line = |line: &str| match line.split_once(": ") {
         Some(("id", _)) => "id".to_owned(),
@@ -77,7 +77,7 @@ fn events(text: &str) -> String {
     text.lines().map(line).collect::<Vec<_>>().join("\n")
 }
 
-/// Parts of a stream without the header that says how long each took.
+/// The parts of a stream without the header that has their time.
 fn without_times(bytes: &[u8]) -> Vec<u8> {
     let name = b"X-Cloudchamber-Elapsed-Ms: ";
     let is_time = |line: &&[u8]| line.starts_with(name);

@@ -1,4 +1,4 @@
-//! One of the two servers, and what is asked of it.
+//! One of the two servers, and its calls.
 
 use std::path::Path;
 use std::time::Duration;
@@ -11,7 +11,7 @@ use super::mask;
 use crate::common::Server;
 use crate::common::pictures::{self, Asked};
 
-/// How long an answer may take before there is none. A kernel may have to be compiled first.
+/// The time after which an answer counts as missing. A kernel may have to be compiled first.
 const PATIENCE: Duration = Duration::from_secs(180);
 
 /// A server, with the ids that it gave.
@@ -20,7 +20,7 @@ pub struct Side {
     client: reqwest::Client,
     /// The ids of test volumes.
     volumes: Names,
-    /// The ids of renders, in the order in which they were told.
+    /// The ids of renders, in the order in which they came.
     renders: Vec<String>,
 }
 
@@ -50,7 +50,7 @@ impl Side {
         replies
     }
 
-    /// Sends all that an entry says. The replies are without this server's ids and without times.
+    /// Sends all calls of an entry. The replies are without this server's ids and without times.
     pub async fn ask(&mut self, asked: &Asked) -> Vec<Reply> {
         let replies = match asked.request["calls"].as_array() {
             Some(calls) => self.ask_calls(&asked.request, calls).await,
@@ -59,7 +59,7 @@ impl Side {
         replies.into_iter().map(|reply| self.masked(reply)).collect()
     }
 
-    /// Posts a render and fetches what it comes to; its id, where it has one. One that was only just posted may stand anywhere on its way.
+    /// Posts a render and fetches its results; returns also its id, if it has one. A render that was only just posted may be in any state.
     async fn ask_render(&mut self, request: &Value, compare: Compare) -> (Vec<Reply>, Option<String>) {
         let mut names = self.volumes.clone();
         let mut posted = self.send(&Call::new(&json!({"path": "/v1/renders", "json": request}), &names)).await;
@@ -84,7 +84,7 @@ impl Side {
         (replies, Some(id))
     }
 
-    /// Makes the entry's renders, and then its calls, one after the other.
+    /// Makes the entry's renders and then its calls, one after the other.
     async fn ask_calls(&mut self, request: &Value, calls: &[Value]) -> Vec<Reply> {
         let mut names = self.volumes.clone();
         for (i, render) in request["renders"].as_array().into_iter().flatten().enumerate() {
@@ -102,7 +102,7 @@ impl Side {
         replies
     }
 
-    /// Sends a call. Where there is no answer the reply says why.
+    /// Sends a call. If there is no answer, the reply has the reason.
     async fn send(&mut self, call: &Call) -> Reply {
         let mut reply = Reply {
             label: call.label.clone(),

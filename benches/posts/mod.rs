@@ -1,4 +1,4 @@
-//! What the benchmarks of simulations and of light share: a server, and a client that posts a render and waits for it.
+//! The common part of the benchmarks of simulations and of light: a server, and a client that posts a render and waits for it.
 
 use serde_json::Value;
 
@@ -35,7 +35,7 @@ impl Bench {
         reply["id"].as_str().unwrap_or_else(|| panic!("{reply}")).to_owned()
     }
 
-    /// Posts a render and waits for its picture in a format; its place under the server, and the picture.
+    /// Posts a render and waits for its picture in a format. Returns its place under the server, and the picture.
     pub fn picture(&self, request: &Value, format: &str) -> (String, Vec<u8>) {
         let posted = self.client.post(format!("{}/v1/renders", self.server.url())).json(request);
         let reply: Value = self.runtime.block_on(async { posted.send().await.unwrap().json().await.unwrap() });

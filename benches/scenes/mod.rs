@@ -1,4 +1,4 @@
-//! What the benchmarks of views share: the synthetic volume, how it is looked at, and a client that times frames.
+//! The common part of the benchmarks of views: the synthetic volume, its views, and a client that times frames.
 
 #![allow(dead_code, reason = "each benchmark uses its own part of this")]
 
@@ -10,9 +10,9 @@ use serde_json::{Value, json};
 
 use super::common::Server;
 
-/// Frames of a full turn.
+/// The number of frames of a full turn.
 pub const FRAMES: usize = 12;
-/// Voxels a side of the volume that is compared with VTK.
+/// The voxels along a side of the volume that is compared with VTK.
 pub const SIDE: usize = 256;
 
 /// exp(−4r²)(0.6 + 0.4 sin 14x sin 14y sin 14z) on [−1, 1]³ as bytes.
@@ -37,7 +37,7 @@ pub fn list<T: ToString>(of: [T; 3]) -> String {
     of.map(|v| v.to_string()).join(",")
 }
 
-/// Seconds of a frame of VTK's, of a volume of bytes seen from a distance; its first picture goes to `out`. None without VTK.
+/// The seconds of a frame of VTK's, of a volume of bytes seen from a distance; `None` without VTK. Its first picture goes to `out`.
 pub fn vtk(
     raw: &Path,
     dims: [usize; 3],
@@ -53,9 +53,9 @@ pub fn vtk(
     serde_json::from_slice(&output.stdout).ok()
 }
 
-/// What is measured: its name here and in `vtk_views.py`, the technique, its parameters.
+/// The measured modes: the name here and in `vtk_views.py`, the technique, its parameters.
 pub fn modes() -> Vec<(&'static str, &'static str, Value)> {
-    // VTK's opacities are for four voxels; it ends a ray when 0.8 % gets through and takes its samples without jitter.
+    // VTK's opacities are for four voxels. VTK ends a ray when 0.8 % gets through, and takes its samples without jitter.
     let unit = 4.0 * 2.0 / SIDE as f64;
     let point = |value: f64, color: [f64; 3], opacity: f64| json!({"value": value, "color": color, "opacity_per_unit": -(1.0 - opacity).ln() / unit});
     let points: Vec<Value> = (0..=50)

@@ -1,17 +1,17 @@
-//! What was decoded or made of late, the least recently used forgotten first.
+//! The cache of decoded and built things. It forgets the least recently used first.
 
 use std::any::Any;
 use std::sync::{Arc, Mutex};
 
 /// A thing that may be kept in memory.
 pub trait Resident: Any + Send + Sync {
-    /// Bytes in memory. They may grow, as when coarser levels of a volume are made.
+    /// The bytes in memory. They may grow, as when coarser levels of a volume are made.
     fn resident_bytes(&self) -> u64;
 }
 
-/// Things of any kind within one limit of bytes, by keys that name their kind. One that is forgotten lives on while somebody holds its `Arc`.
+/// Things of any kind within one limit of bytes, by keys that name their kind. A forgotten thing lives on while somebody holds its `Arc`.
 pub(super) struct Cache {
-    /// The least recently used first.
+    /// The entries, the least recently used first.
     entries: Vec<Entry>,
     max_bytes: u64,
 }
@@ -19,7 +19,7 @@ pub(super) struct Cache {
 struct Entry {
     key: String,
     thing: Arc<dyn Any + Send + Sync>,
-    /// The same thing.
+    /// The same thing, for its size.
     resident: Arc<dyn Resident>,
 }
 
@@ -32,7 +32,7 @@ impl Cache {
         Self { entries: Vec::new(), max_bytes }
     }
 
-    /// The thing, which becomes the most recently used.
+    /// The thing of a key. It becomes the most recently used.
     pub fn get<A: Resident>(&mut self, key: &str) -> Option<Arc<A>> {
         let place = self.entries.iter().position(|entry| entry.key == key)?;
         let entry = self.entries.remove(place);
@@ -41,7 +41,7 @@ impl Cache {
         thing
     }
 
-    /// Adds a thing, and forgets as many old ones as it takes. One above the limit is not kept at all.
+    /// Adds a thing, and forgets as many old ones as necessary. A thing above the limit is not kept at all.
     pub fn put<A: Resident>(&mut self, key: String, thing: &Arc<A>) {
         self.remove(&key);
         if thing.resident_bytes() > self.max_bytes {
@@ -58,7 +58,7 @@ impl Cache {
         self.entries.retain(|entry| entry.key != key);
     }
 
-    /// Bytes of all that is kept.
+    /// The bytes of all things that are kept.
     pub fn bytes(&self) -> u64 {
         self.entries.iter().map(|entry| entry.resident.resident_bytes()).sum()
     }

@@ -1,4 +1,4 @@
-//! A store's folder: for each upload the body as it came and a JSON record, which is written last.
+//! The folder of a store. It has for each upload the body as it came and a JSON record, which is written last.
 //!
 //! Every file is written under a temporary name, flushed and renamed. A crash leaves at worst a body without a
 //! record or a temporary file; both are removed at the next start.
@@ -10,25 +10,25 @@ use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// Hexadecimal digits of an id.
+/// The number of hexadecimal digits of an id.
 const ID_DIGITS: usize = 32;
 
-/// Begins the names of files that are being written.
+/// The beginning of the names of files that are being written.
 const TEMPORARY: &str = "tmp-";
 
-/// What stands beside an upload in `ID.json`.
+/// The record of an upload, which stands beside it in `ID.json`.
 #[derive(serde::Serialize, serde::Deserialize)]
 #[serde(bound = "")]
 pub(super) struct Record<A: Asset> {
-    /// What is told of it in lists.
+    /// Its description in lists.
     pub info: A::Info,
-    /// How its bytes are to be read, if they do not say so themselves.
+    /// The way to read its bytes, if they do not tell it themselves.
     pub raw: Option<A::How>,
-    /// Extension of the uploaded file, after its content.
+    /// The extension of the uploaded file, after its content.
     pub extension: String,
-    /// Bytes of the uploaded file.
+    /// The bytes of the uploaded file.
     pub file_bytes: u64,
-    /// Seconds since 1970.
+    /// The time of the upload, in seconds since 1970.
     pub created_unix_s: u64,
 }
 
@@ -42,7 +42,7 @@ impl<A: Asset> Clone for Record<A> {
     }
 }
 
-/// True if the text is an id as this store makes them; nothing else ever becomes part of a path.
+/// True if the text is an id as this store makes them. Nothing else ever becomes part of a path.
 pub(super) fn is_id(text: &str) -> bool {
     text.len() == ID_DIGITS && text.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
 }
@@ -54,7 +54,7 @@ fn is_extension(text: &str) -> bool {
         && !text.contains("..")
 }
 
-/// The id of a body: its hash, and that of how it is to be read.
+/// The id of a body: the hash of its bytes and of the way to read them.
 pub(super) fn id_of(bytes: &[u8], how: Option<&impl serde::Serialize>) -> Result<String> {
     let mut hasher = blake3::Hasher::new();
     hasher.update(bytes);
@@ -68,7 +68,7 @@ pub(super) fn id_of(bytes: &[u8], how: Option<&impl serde::Serialize>) -> Result
 pub(super) struct Folder(PathBuf);
 
 impl Folder {
-    /// Opens or creates the folder, removes what a crash has left, and reads the records.
+    /// Opens or creates the folder, removes the leftovers of a crash, and reads the records.
     pub fn open<A: Asset>(dir: &Path) -> Result<(Self, Records<A>)> {
         fs::create_dir_all(dir).map_err(|cause| failed("create the folder of a store", &cause))?;
         let folder = Self(dir.to_owned());
@@ -81,7 +81,7 @@ impl Folder {
             }
         }
         for name in &names {
-            // A body whose record cannot be read stays: another version of this program may know how.
+            // A body whose record cannot be read stays, since another version of this program may know the record.
             let left_over = name.split_once('.').is_some_and(|(id, extension)| {
                 is_id(id) && extension != "json" && !names.contains(&format!("{id}.json"))
             });
@@ -134,7 +134,7 @@ impl Folder {
         });
         let renamed = written.and_then(|()| fs::rename(&temporary, path));
         if renamed.is_err() {
-            // A full disk is the likely cause: give back what was taken.
+            // A full disk is the likely cause, so the space is given back.
             let _ = fs::remove_file(&temporary);
         }
         renamed
@@ -145,7 +145,7 @@ impl Folder {
         fs::read(self.body_path(id, record)).map_err(|cause| failed("read what is stored", &cause))
     }
 
-    /// Removes an upload: the record first, so that no record is without its body.
+    /// Removes an upload. Its record goes first, so that no record is without its body.
     pub fn remove<A: Asset>(&self, id: &str, record: &Record<A>) -> Result<()> {
         self.remove_file(&format!("{id}.json"))?;
         self.remove_file(&format!("{id}.{}", record.extension))

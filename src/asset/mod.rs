@@ -1,7 +1,7 @@
 //! Stored things, by the hash of their content: one handle for all techniques.
 //!
-//! A kind of asset implements [`Asset`] in a file here and has a [`Store`] in [`Assets`]. All kinds share the limits: bytes on disk, and bytes
-//! of what is decoded. Built-in volumes are made when asked for, and count as decoded.
+//! A kind of asset implements [`Asset`] in a file here and has a [`Store`] in [`Assets`]. All kinds share the limits: bytes on disk, and bytes of
+//! decoded things. Built-in volumes are made when asked for, and count as decoded.
 
 mod cache;
 mod folder;
@@ -21,23 +21,23 @@ use crate::error::{Error, Result};
 use crate::volume::builtin::{self, BUILTINS};
 use crate::volume::{Volume, VolumeInfo, VolumeLimits};
 
-/// How much is kept.
+/// The limits of the stores.
 #[derive(Debug, Clone, Copy)]
 pub struct AssetLimits {
-    /// How large one volume may be.
+    /// The limits of one volume.
     pub volume: VolumeLimits,
-    /// Bytes of all uploaded files on disk.
+    /// The bytes of all uploaded files on disk.
     pub max_store_bytes: u64,
-    /// Bytes of decoded things kept in memory for the next use. Those in use are not counted once forgotten.
+    /// The bytes of decoded things in memory for the next use. Forgotten things that are still in use are not counted.
     pub max_resident_bytes: u64,
 }
 
-/// All that is stored. One process at a time may use a folder.
+/// All stored things. One process at a time may use a folder.
 pub struct Assets {
     volumes: Store<Volume>,
     cache: SharedCache,
     limits: AssetLimits,
-    /// Held while a built-in is made: one at a time. Taken before the cache, never after.
+    /// The lock for the making of built-ins, one at a time. It is taken before the cache's, never after.
     making: Mutex<()>,
 }
 
@@ -57,7 +57,7 @@ impl Assets {
         &self.volumes
     }
 
-    /// A built-in volume, built if it is not in memory.
+    /// A built-in volume. It is built if it is not in memory.
     ///
     /// # Errors
     /// [`Error::Invalid`] at `/volume/builtin` or `/volume/resolution`; [`Error::TooLarge`] above the volume limits.
@@ -83,7 +83,7 @@ impl Assets {
         Ok(volume)
     }
 
-    /// What is known of a built-in, with its histogram.
+    /// The description of a built-in, with its histogram.
     ///
     /// # Errors
     /// As [`Assets::builtin`].
@@ -91,18 +91,18 @@ impl Assets {
         Ok(VolumeInfo::of_builtin(name, resolution, seed, &*self.builtin(name, resolution, seed)?))
     }
 
-    /// The built-ins at their default resolution, then the uploads, oldest first. Decodes and builds nothing.
+    /// The built-ins at their default resolution, then the uploads, oldest first. Nothing is decoded or built.
     pub fn list_volumes(&self) -> Vec<VolumeInfo> {
         BUILTINS.iter().map(VolumeInfo::of_unbuilt).chain(self.volumes.list()).collect()
     }
 
-    /// Bytes of all uploaded files on disk, and of all decoded things kept in memory.
+    /// The bytes of all uploaded files on disk, and of all decoded things in memory.
     pub fn sizes(&self) -> (u64, u64) {
         (self.volumes.file_bytes(), lock(&self.cache).bytes())
     }
 }
 
-/// A panic elsewhere leaves the state whole: it is changed in single steps only.
+/// Takes a lock. A panic elsewhere leaves the state whole, since it is changed in single steps only.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

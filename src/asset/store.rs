@@ -10,14 +10,14 @@ use super::kind::Asset;
 use super::{AssetLimits, lock};
 use crate::error::{Error, Result};
 
-/// Uploads of one kind.
+/// The uploads of one kind.
 pub struct Store<A: Asset> {
     folder: Folder,
     limits: AssetLimits,
     records: Mutex<Records<A>>,
     cache: SharedCache,
-    /// Held while one is decoded or written: one at a time, so that many requests together take no more memory than one, and the same content
-    /// sent twice at once is stored once. Taken before the others, never after.
+    /// The lock for decoding and writing, one upload at a time. Many requests together then take no more memory than one, and the same content that
+    /// is sent twice at once is stored once. It is taken before the other locks, never after.
     working: Mutex<()>,
 }
 
@@ -31,7 +31,7 @@ impl<A: Asset> Store<A> {
         Ok(Self { folder, limits, records: Mutex::new(records), cache, working: Mutex::new(()) })
     }
 
-    /// Reads and keeps an upload. Returns it with its id, and whether it is new: the same content, read in the same way, is one, under the
+    /// Reads and keeps an upload. Returns it with its id, and true if it is new. The same content, read in the same way, is one upload, under the
     /// name that it had first.
     ///
     /// # Errors
@@ -67,10 +67,10 @@ impl<A: Asset> Store<A> {
         Ok(())
     }
 
-    /// An upload, decoded again if it was forgotten.
+    /// An upload. It is decoded again if it was forgotten.
     ///
     /// # Errors
-    /// [`Error::NotFound`] for an unknown id, also one that is not an id at all.
+    /// [`Error::NotFound`] for an unknown id, or for a text that is not an id at all.
     pub fn get(&self, id: &str) -> Result<Arc<A>> {
         self.record(id)?;
         if let Some(asset) = self.cached(id) {
@@ -80,7 +80,7 @@ impl<A: Asset> Store<A> {
         self.decoded(id)
     }
 
-    /// The one of a known id; `working` is held.
+    /// The upload of a known id. The lock `working` is held.
     fn decoded(&self, id: &str) -> Result<Arc<A>> {
         if let Some(asset) = self.cached(id) {
             return Ok(asset);
@@ -96,10 +96,10 @@ impl<A: Asset> Store<A> {
         Ok(asset)
     }
 
-    /// As [`Store::get`], where the request's field at `pointer` names it.
+    /// As [`Store::get`], for an id in the request's field at `pointer`.
     ///
     /// # Errors
-    /// Those of [`Store::get`]; [`Error::Invalid`] with the pointer where there is no such one.
+    /// Those of [`Store::get`]; [`Error::Invalid`] with the pointer when there is no such asset.
     pub fn named(&self, id: &str, pointer: &str) -> Result<Arc<A>> {
         self.get(id).map_err(|e| match e {
             Error::NotFound { .. } => {
@@ -110,7 +110,7 @@ impl<A: Asset> Store<A> {
         })
     }
 
-    /// What is known of an upload, in full.
+    /// The full description of an upload.
     ///
     /// # Errors
     /// As [`Store::get`].
@@ -118,7 +118,7 @@ impl<A: Asset> Store<A> {
         Ok(self.get(id)?.info(id))
     }
 
-    /// The uploads, oldest first. Decodes nothing.
+    /// The uploads, oldest first. Nothing is decoded.
     pub fn list(&self) -> Vec<A::Info> {
         let records = lock(&self.records);
         let mut uploads: Vec<_> = records.values().collect();
@@ -139,7 +139,7 @@ impl<A: Asset> Store<A> {
         Ok(())
     }
 
-    /// Bytes of all uploaded files on disk.
+    /// The bytes of all uploaded files on disk.
     pub(super) fn file_bytes(&self) -> u64 {
         lock(&self.records).values().map(|record| record.file_bytes).sum()
     }

@@ -1,4 +1,4 @@
-//! The command line's side of the HTTP contract: post a scene, follow its frames, fetch the last one.
+//! The command line's side of the HTTP contract: it posts a scene, follows its frames, and fetches the last one.
 
 use std::path::Path;
 use std::time::Duration;
@@ -8,10 +8,10 @@ use serde_json::Value;
 
 use crate::error::{Error, Result};
 
-/// How often and how long a full queue is tried again.
+/// The number of attempts while the queue is full.
 const RETRIES: u32 = 20;
 
-/// A running server.
+/// A client of a running server.
 pub struct Client {
     base: String,
     http: reqwest::Client,
@@ -71,10 +71,10 @@ impl Client {
         reply["id"].as_str().map(str::to_owned).ok_or_else(|| Error::internal("the server gave no id"))
     }
 
-    /// Posts a render or an export to `path` and follows it to its end, event by event; returns what its `link` leads to, and its resource.
+    /// Posts a render or an export to `path` and follows it to its end, event by event. Returns the bytes behind its `link`, and its resource.
     ///
     /// # Errors
-    /// The server's refusal in its words, or how it ended otherwise.
+    /// The server's refusal in its words, or the state in which it ended.
     pub async fn run(
         &self,
         path: &str,
@@ -125,7 +125,7 @@ async fn refusal(response: reqwest::Response) -> Error {
     Error::Malformed(format!("the server answered {status}: {detail}"))
 }
 
-/// Asks `/healthz` once, past any proxy.
+/// Asks `/healthz` once, without any proxy.
 ///
 /// # Errors
 /// [`Error::Unavailable`] with the reason.

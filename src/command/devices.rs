@@ -23,14 +23,14 @@ pub(super) struct Arguments {
 pub(super) fn show_devices(args: &DeviceArgs) -> Result<()> {
     let all: Vec<_> = device::list(args.lanes)?.into_iter().map(|(_, info)| info).collect();
     let (_, chosen) = device::select(&args.device, args.lanes)?;
-    // An opened one knows more of itself; one that cannot be opened is shown all the same.
+    // An opened device knows more of itself. A device that cannot be opened is shown all the same.
     let used = device::Device::open(&args.device_config()).map_or(chosen, |device| device.info().clone());
     let text = serde_json::to_string_pretty(&json!({"devices": all, "would_use": used})).map_err(Error::internal)?;
     println!("{text}");
     Ok(())
 }
 
-/// Every variant of every kernel: a render builds those that its plan needs, and those that are common are built at the start.
+/// Prints every variant of every kernel. A render builds those that its plan needs, and common ones are built at the start.
 ///
 /// # Errors
 /// [`Error::Internal`] when there is no device.

@@ -1,4 +1,4 @@
-//! `export`: a volume or a field to a file, here or by a server.
+//! `export`: makes a file of a volume or a field, here or on a server.
 
 use std::path::PathBuf;
 
@@ -38,7 +38,7 @@ pub(super) struct Arguments {
 /// Makes a file and writes it.
 ///
 /// # Errors
-/// Those of the request, of its file, and of the server where one is named.
+/// Those of the request, of its file, and of the server if one is named.
 pub(super) async fn export(args: &Arguments) -> Result<()> {
     let request = read_json(&args.request)?;
     let style = ProgressStyle::with_template("{bar:30} {percent}%  {msg}  {elapsed}");
@@ -73,7 +73,7 @@ async fn export_there(
     client.run("/v1/exports", &request, "file", |event| show(bar, &event["progress"])).await
 }
 
-/// The same code as the server's, without the server.
+/// Runs the same code as the server, without the server.
 async fn export_here(args: &Arguments, mut request: Value, bar: &ProgressBar) -> Result<(Vec<u8>, Value)> {
     let service = Service::start(args.device.device_config(), &args.device.data_dir(), args.limits.clone())?;
     if let Some(path) = &args.volume {

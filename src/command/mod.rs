@@ -58,20 +58,20 @@ fn read_json(path: &Path) -> Result<Value> {
     serde_json::from_str(&text).map_err(|e| Error::Malformed(format!("{}: {e}", path.display())))
 }
 
-/// Stores a volume file and returns what goes under `volume`.
+/// Stores a volume file and returns the request's value for `volume`.
 fn insert(service: &Service, path: &Path) -> Result<Value> {
     let bytes = std::fs::read(path).map_err(|e| Error::Malformed(format!("{}: {e}", path.display())))?;
     let name = path.file_name().map_or_else(|| "volume".into(), |n| n.to_string_lossy().into_owned());
     Ok(json!({"id": service.assets().volumes().insert(bytes, &name, None)?.1}))
 }
 
-/// Runs what the command line asks for. Must be called before any other thread is started.
+/// Runs the command. It must be called before any other thread is started.
 ///
 /// # Errors
-/// Those of the command, in words for whoever typed it.
+/// Those of the command, in words for the user.
 pub fn run(arguments: Arguments) -> Result<()> {
     let Arguments { command } = arguments;
-    // Before any other thread is there: PoCL reads its cache folder from the environment.
+    // PoCL reads its cache folder from the environment, so this comes before any other thread is there.
     let device = match &command {
         Command::Serve(config) => Some(&config.device),
         Command::Render(args) => Some(&args.device),
@@ -99,7 +99,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
             Command::Healthcheck { listen } => client::healthcheck(&format!("http://{listen}")).await,
         }
     });
-    // A blocking task that still encodes a frame for nobody must not hold the exit up.
+    // A blocking task that still encodes a frame for nobody must not delay the exit.
     runtime.shutdown_background();
     result
 }

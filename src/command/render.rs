@@ -1,4 +1,4 @@
-//! `render`: a scene to a picture, here or by a server.
+//! `render`: makes a picture of a scene, here or on a server.
 
 use std::path::PathBuf;
 
@@ -50,7 +50,7 @@ fn bar(scene: &Value) -> ProgressBar {
 /// Renders a scene and writes its picture.
 ///
 /// # Errors
-/// Those of the scene, of its file, and of the server where one is named.
+/// Those of the scene, of its file, and of the server if one is named.
 pub(super) async fn render(args: &Arguments) -> Result<()> {
     let mut scene = read_json(&args.scene)?;
     let (bytes, report) = match &args.server {
@@ -86,7 +86,7 @@ async fn render_there(args: &Arguments, server: &str, scene: &mut Value) -> Resu
     done
 }
 
-/// The same code as the server's, without the server.
+/// Runs the same code as the server, without the server.
 async fn render_here(args: &Arguments, scene: &mut Value) -> Result<(Vec<u8>, Value)> {
     let service = Service::start(args.device.device_config(), &args.device.data_dir(), args.limits.clone())?;
     if let Some(path) = &args.volume {

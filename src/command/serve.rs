@@ -1,4 +1,4 @@
-//! `serve`: the HTTP API and the viewer, until it is told to stop.
+//! `serve`: the HTTP API and the viewer, until a signal stops them.
 
 use crate::config::Config;
 use crate::error::{Error, Result};
@@ -10,8 +10,8 @@ use crate::http::Server;
 /// Those of the server.
 pub(super) async fn serve(mut config: Config) -> Result<()> {
     config.device.compiler = std::env::current_exe().ok();
-    // Before the device: the LLVM inside PoCL handles SIGTERM too. Handlers that it finds it passes the signal on to; one that
-    // comes after it calls LLVM's first, which ends the process.
+    // The handlers come before the device, since the LLVM inside PoCL handles SIGTERM too. LLVM passes the signal on to handlers that it finds. A
+    // later handler would call LLVM's first, which ends the process.
     let stop = stop_signal()?;
     let server = Server::bind(&config).await?;
     println!("Cloudchamber listens on http://{}", server.address()?);

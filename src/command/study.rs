@@ -1,4 +1,4 @@
-//! `study`: measures speed against accuracy, and where methods fail.
+//! `study`: measures speed against accuracy, and the limits of the methods.
 
 use std::path::PathBuf;
 
@@ -31,7 +31,7 @@ pub(super) struct Arguments {
 /// Runs the cases asked for and stores their results.
 ///
 /// # Errors
-/// Those of the requests, of the folder, and one where a method is wrong and silent.
+/// Those of the requests and of the folder, and one if a method is wrong and silent.
 pub(super) fn study(args: &Arguments) -> Result<()> {
     let asked = |name: &str| args.case.as_deref().is_none_or(|case| case == name);
     let all_experiments = asked(STABILITY);
@@ -71,7 +71,7 @@ pub(super) fn study(args: &Arguments) -> Result<()> {
     if asked(PLANNER) {
         let scenes = args.scenes.clone().unwrap_or(0..scale.pick(10, 110));
         for scene in scenes {
-            // Each is written at once: all of them take long.
+            // Each result is written at once, since all of them take long.
             let all = results.put_planned(study::planner::planner(&bench, scene..scene + 1, &mut told)?)?;
             let ([met, timed, cheap], n) = (all.figures(), all.scenes.len());
             told(&format!("of {n} plans {met} meet the error, {timed} the time, {cheap} the cost"));

@@ -1,11 +1,11 @@
-//! Content negotiation: the best of what can be made, by the quality values of `Accept` (RFC 9110, 12.5.1).
+//! Content negotiation: the best type that can be made, by the quality values of `Accept` (RFC 9110, 12.5.1).
 
 use axum::http::{HeaderMap, header};
 use mime::Mime;
 
 use crate::error::{Error, Result};
 
-/// How well a media range fits a type: exact, the whole main type, anything, or not at all.
+/// The fit of a media range to a type: 2 if exact, 1 by the main type, 0 for anything; `None` if it does not fit.
 fn fit(range: &Mime, offer: &str) -> Option<u8> {
     let (main, sub) = offer.split_once('/')?;
     match (range.type_().as_str(), range.subtype().as_str()) {
@@ -16,10 +16,10 @@ fn fit(range: &Mime, offer: &str) -> Option<u8> {
     }
 }
 
-/// The offer that the client likes best; the first one when it has no wish.
+/// The offer that the client prefers; the first offer if it has no preference.
 ///
 /// # Errors
-/// [`Error::NotAcceptable`] when it likes none.
+/// [`Error::NotAcceptable`] when it accepts none.
 pub fn negotiate(headers: &HeaderMap, offers: &[&'static str]) -> Result<&'static str> {
     let wishes: Vec<Mime> = headers
         .get_all(header::ACCEPT)
@@ -32,7 +32,7 @@ pub fn negotiate(headers: &HeaderMap, offers: &[&'static str]) -> Result<&'stati
         return offers.first().copied().ok_or_else(|| Error::internal("nothing to negotiate"));
     }
     let quality = |range: &Mime| range.get_param("q").and_then(|q| q.as_str().parse::<f32>().ok()).unwrap_or(1.0);
-    // The most specific range that fits an offer says how much it is liked.
+    // The most specific range that fits an offer gives its quality.
     let liked = |offer: &str| {
         wishes
             .iter()

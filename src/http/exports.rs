@@ -47,7 +47,7 @@ pub(super) struct FileQuery {
     wait: Option<String>,
 }
 
-/// `GET /v1/exports/{id}/file`: 409 before it is there, unless `?wait=final` waits for it.
+/// `GET /v1/exports/{id}/file`: 409 before the file is there, unless `?wait=final` waits for it.
 pub(super) async fn file(
     State(app): State<App>,
     Id(id): Id,
@@ -76,7 +76,7 @@ async fn wait_for_end(app: &App, job: &Arc<Job>) -> Result<()> {
     }
 }
 
-/// Why there is no file.
+/// The reason for a missing file, as an error.
 fn why_not(job: &Job) -> Error {
     match job.state() {
         JobState::Failed => job.failure().unwrap_or_else(|| Error::internal("an export failed")),

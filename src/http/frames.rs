@@ -1,4 +1,4 @@
-//! A frame as a response: PNG and EXR with what they say of themselves in headers, and `frame.png` and `frame.exr`.
+//! A frame as a response: PNG and EXR with the frame's numbers in headers, and `frame.png` and `frame.exr`.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::frame;
 use crate::job::{Frame, Job, State as JobState};
 
-/// The newest frame; the final one if `last`, else the first that there is.
+/// Waits for a frame: the final one if `last`, else the newest, or the first if there is none yet.
 pub(super) async fn wait_for(app: &App, job: &Job, last: bool) -> Result<Arc<Frame>> {
     let mut updates = job.watch();
     loop {
@@ -36,7 +36,7 @@ pub(super) async fn wait_for(app: &App, job: &Job, last: bool) -> Result<Arc<Fra
     }
 }
 
-/// What a frame says of itself in headers.
+/// The numbers of a frame as headers.
 pub(super) fn frame_headers(frame: &Frame) -> Vec<(&'static str, String)> {
     let lowered = (!frame.lowered.is_none()).then(|| ("X-Cloudchamber-Lowered", frame.lowered.words().join("; ")));
     let always = [
@@ -64,7 +64,7 @@ pub(super) fn png(frame: &Frame) -> Response {
     with_frame_headers(([(header::CONTENT_TYPE, "image/png")], frame.png.clone()).into_response(), frame, &frame.etag)
 }
 
-/// The film as it is by now: that of a running render may have more samples than its newest frame.
+/// The present film as EXR. The film of a running render may have more samples than its newest frame.
 pub(super) async fn exr(app: &App, job: &Arc<Job>, frame: &Frame) -> Result<Response> {
     let film = app.service.engine().film(job).await;
     job.set_film_wanted(false);
@@ -91,7 +91,7 @@ impl FrameQuery {
     }
 }
 
-/// True if the client has the frame of this tag already.
+/// True if the client already has the frame with this tag.
 fn unchanged(headers: &HeaderMap, etag: &str) -> bool {
     let tag = etag.parse::<headers::ETag>().ok();
     headers.typed_get::<headers::IfNoneMatch>().zip(tag).is_some_and(|(seen, tag)| !seen.precondition_passes(&tag))

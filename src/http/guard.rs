@@ -1,4 +1,4 @@
-//! Who may come in: bearer tokens, compared by hash so that the time taken tells nothing.
+//! Access by bearer tokens. They are compared by hash, so that the time of a comparison tells nothing.
 
 use std::sync::Arc;
 
@@ -13,15 +13,15 @@ use headers::authorization::{Authorization, Basic, Bearer};
 use crate::config::Config;
 use crate::error::{Error, Result};
 
-/// The tokens that are accepted; none means that everybody may come in.
+/// The accepted tokens. If there are none, everybody may come in.
 #[derive(Clone, Default)]
 pub(super) struct Tokens(Arc<Vec<blake3::Hash>>);
 
 impl Tokens {
-    /// From the flag and the file.
+    /// The tokens of the flag and the file.
     ///
     /// # Errors
-    /// [`Error::Internal`] when the file cannot be read or holds no token: an open door must not be a typo.
+    /// [`Error::Internal`] when the file cannot be read or holds no token, so that a typo does not leave the door open.
     pub fn read(config: &Config) -> Result<Self> {
         let mut tokens: Vec<String> = config.token.iter().filter(|t| !t.is_empty()).cloned().collect();
         if let Some(file) = &config.token_file {
@@ -46,7 +46,7 @@ impl Tokens {
     }
 }
 
-/// Lets `/healthz` pass, and everything else with a token.
+/// Admits `/healthz`, and everything else only with a token, if there are tokens.
 pub(super) async fn check(State(tokens): State<Tokens>, request: Request<Body>, next: Next) -> Response {
     if tokens.0.is_empty() || request.uri().path() == "/healthz" || tokens.admit(request.headers()) {
         next.run(request).await

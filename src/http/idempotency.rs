@@ -1,10 +1,10 @@
-//! Idempotency keys: the same key with the same body is the same render.
+//! Idempotency keys: the same key with the same body gives the same render.
 
 use std::collections::{HashMap, VecDeque};
 
 use crate::error::{Error, Result};
 
-/// Keys that are remembered.
+/// The number of keys that are remembered.
 const KEYS: usize = 4096;
 
 /// The keys with the hash of their body and the id of the render that they made, and the order in which they came.
@@ -15,10 +15,10 @@ pub(super) struct Idempotency {
 }
 
 impl Idempotency {
-    /// The id of the render that a key made before.
+    /// The id of the render that was made with a key before.
     ///
     /// # Errors
-    /// [`Error::Conflict`] where the key came with another body.
+    /// [`Error::Conflict`] when the key came with another body.
     pub fn made_by(&self, key: &str, body: blake3::Hash) -> Result<Option<String>> {
         match self.by_key.get(key) {
             Some((before, _)) if *before != body => {
@@ -28,7 +28,7 @@ impl Idempotency {
         }
     }
 
-    /// Remembers a key; the oldest is forgotten past the limit.
+    /// Remembers a key. Past the limit, the oldest key is forgotten.
     pub fn remember(&mut self, key: String, body: blake3::Hash, id: String) {
         if self.order.len() >= KEYS
             && let Some(oldest) = self.order.pop_front()

@@ -1,4 +1,4 @@
-//! What the service says of itself: techniques, device, health and metrics.
+//! The service's information about itself: techniques, device, health and metrics.
 
 use std::sync::OnceLock;
 
@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::job::Readiness;
 use crate::{render, technique};
 
-/// The process's metrics: one recorder, however many servers are in it.
+/// The recorder of the process's metrics. There is one, however many servers are in the process.
 ///
 /// # Errors
 /// [`Error::Internal`] when another recorder is installed.
@@ -46,13 +46,13 @@ pub(super) async fn device(State(app): State<App>) -> Result<Response> {
     }
 }
 
-/// `GET /healthz`: the process lives.
+/// `GET /healthz`: the process is alive.
 pub(super) async fn healthz() -> Json<Value> {
     Json(json!({"status": "ok"}))
 }
 
-/// `GET /readyz`: the first picture can be rendered, there is room in the queue, and the server is not draining. How far other kernels
-/// are, and what was given up, stands beside it.
+/// `GET /readyz`: success if the first picture can be rendered, the queue has room, and the server is not draining. The reply also has the progress
+/// of other kernels and the attempts to open the device that were given up.
 pub(super) async fn readyz(State(app): State<App>) -> Result<Json<Value>> {
     if app.service.engine().is_draining() {
         return Err(Error::Unavailable("the server is shutting down".into()));
@@ -71,7 +71,7 @@ pub(super) async fn readyz(State(app): State<App>) -> Result<Json<Value>> {
     }
 }
 
-/// Resident memory of this process in bytes, from the kernel's own account.
+/// The resident memory of this process in bytes, from the kernel's own account.
 fn resident_bytes() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|l| l.starts_with("VmRSS:"))?;

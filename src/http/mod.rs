@@ -1,4 +1,4 @@
-//! The HTTP side: routes, negotiation, problem documents, streams. No physics, and the only home of axum.
+//! The HTTP side: routes, negotiation, problem documents, streams. It has no physics, and it is the only home of axum.
 
 mod accept;
 mod exports;
@@ -35,19 +35,19 @@ use crate::service::Service;
 use crate::study::results::Results;
 use idempotency::Idempotency;
 
-/// Uploads at the same time: each may be as large as the limit of a body.
+/// The number of uploads at the same time. Each may be as large as the limit of a body.
 const UPLOADS: usize = 4;
-/// After draining, connections that still will not end get this long.
+/// The time that unfinished connections still get after draining.
 const LAST_WORDS: Duration = Duration::from_secs(3);
 
-/// What every handler shares.
+/// The state that all handlers share.
 #[derive(Clone)]
 pub(crate) struct App {
     service: Service,
     studies: Arc<Results>,
     request_timeout: Duration,
     streams: Arc<Semaphore>,
-    /// Uploads that are held in memory at the same time; the others wait unread.
+    /// The permits for uploads in memory. Other uploads wait unread.
     uploads: Arc<Semaphore>,
     /// Ends every stream when the server stops.
     stop: CancellationToken,
@@ -57,13 +57,13 @@ pub(crate) struct App {
 }
 
 impl App {
-    /// The render of an id.
+    /// The render with an id.
     fn render(&self, id: &str) -> Result<Arc<Job>> {
         let missing = || Error::NotFound { what: "render", id: id.chars().take(64).collect() };
         self.service.engine().job(id).filter(|job| job.is_render()).ok_or_else(missing)
     }
 
-    /// The export of an id.
+    /// The export with an id.
     fn export(&self, id: &str) -> Result<Arc<Job>> {
         let missing = || Error::NotFound { what: "export", id: id.chars().take(64).collect() };
         self.service.engine().job(id).filter(|job| !job.is_render()).ok_or_else(missing)
@@ -86,7 +86,7 @@ impl App {
     }
 }
 
-/// Measures the device for the planner; a plan that comes meanwhile waits for it.
+/// Measures the device for the planner. A plan that is asked for meanwhile waits for the measurement.
 async fn calibrate(service: Service) {
     if service.engine().ready().await.is_err() {
         return;
@@ -107,7 +107,7 @@ pub struct Server {
 }
 
 impl Server {
-    /// Starts the service and binds the address. The device warms up meanwhile; `/readyz` says when.
+    /// Starts the service and binds the address. The device warms up meanwhile; `/readyz` tells when it is ready.
     ///
     /// # Errors
     /// [`Error::Internal`] with the cause in words.
@@ -149,7 +149,7 @@ impl Server {
         self.service.engine()
     }
 
-    /// Serves until `signal` comes, then drains: new work is refused, running renders get their time, streams end.
+    /// Serves until `signal` comes, then drains: new work is refused, running renders get their time, and streams end.
     ///
     /// # Errors
     /// [`Error::Internal`] when the listener fails.
@@ -162,7 +162,7 @@ impl Server {
                 signal.await;
                 tracing::info!("draining");
                 engine.drain(drain).await;
-                // One moment for the last frames to be written to those who wait for them.
+                // The last frames get a moment to be written to those who wait for them.
                 tokio::time::sleep(Duration::from_millis(50)).await;
                 stop.cancel();
                 drained.cancel();

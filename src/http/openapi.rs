@@ -1,4 +1,4 @@
-//! `/openapi.json`, made from one table of operations and the very schemas that bodies are checked against, and `/docs`.
+//! `/openapi.json`, made from one table of operations and from the schemas that bodies are checked against, and `/docs`.
 
 use std::sync::Arc;
 
@@ -275,7 +275,7 @@ pub(super) async fn document(State(app): State<App>) -> Json<Value> {
     }))
 }
 
-/// `GET /docs`: to the page itself, so that its relative links work.
+/// `GET /docs`: a redirect to the page itself, so that its relative links work.
 pub(super) async fn docs_root() -> Redirect {
     Redirect::permanent("/docs/")
 }

@@ -1,4 +1,4 @@
-//! `POST /v1/plan`: what a request would be rendered with, what that would cost and be wrong by, and why.
+//! `POST /v1/plan`: the technique and options for a request, their predicted cost and error, and the reasons.
 
 use axum::Json;
 use axum::body::Body;

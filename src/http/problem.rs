@@ -1,4 +1,4 @@
-//! Errors as RFC 9457 problem documents, and reading bodies so that every failure becomes one.
+//! Errors as RFC 9457 problem documents, and the readers of bodies, in which every failure becomes a problem document.
 
 use std::time::Duration;
 
@@ -17,7 +17,7 @@ impl IntoResponse for Error {
     fn into_response(self) -> Response {
         let (code, title) = self.status();
         let status = StatusCode::from_u16(code).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
-        // What went wrong inside is for the log, not for the client.
+        // The cause of an internal error is for the log, not for the client.
         let detail = match &self {
             Error::Internal(cause) => {
                 tracing::error!(%cause, "internal error");
@@ -41,7 +41,7 @@ impl IntoResponse for Error {
             }
             Error::Unavailable(_) => drop(headers.insert(header::RETRY_AFTER, HeaderValue::from(5))),
             Error::Unauthorized => {
-                // Basic lets a browser ask for the token, as the password, and send it with everything the viewer loads.
+                // Basic lets a browser ask for the token, as the password, and send it with everything that the viewer loads.
                 headers.append(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
                 headers.append(
                     header::WWW_AUTHENTICATE,
@@ -54,7 +54,7 @@ impl IntoResponse for Error {
     }
 }
 
-/// The last part of a path, decoded; one that is not UTF-8 names nothing.
+/// The last part of a path, decoded. A part that is not UTF-8 names nothing.
 pub struct Id(pub String);
 
 impl<S: Send + Sync> FromRequestParts<S> for Id {
@@ -67,14 +67,14 @@ impl<S: Send + Sync> FromRequestParts<S> for Id {
     }
 }
 
-/// A panic in a handler, told as any other internal error.
+/// A panic in a handler, reported like any other internal error.
 pub fn from_panic(panic: Box<dyn std::any::Any + Send>) -> Response {
     let words =
         panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied()).unwrap_or("panic");
     Error::internal(format!("a handler panicked: {words}")).into_response()
 }
 
-/// The body, at most `limit` bytes, with at most `patience` between two pieces of it.
+/// The body: at most `limit` bytes, with at most `patience` between two pieces of it.
 ///
 /// # Errors
 /// [`Error::TooLarge`], [`Error::RequestTimeout`], or [`Error::Malformed`] when it breaks off.
@@ -84,7 +84,7 @@ pub async fn read_body(headers: &HeaderMap, body: Body, limit: usize, patience: 
     if announced.is_some_and(|n| n > limit as u64) {
         return Err(too_large());
     }
-    // Grows with what arrives: an announced length is not believed.
+    // The buffer grows with the bytes that arrive, since an announced length is not trusted.
     let mut bytes = Vec::new();
     let mut stream = body.into_data_stream();
     loop {
@@ -101,7 +101,7 @@ pub async fn read_body(headers: &HeaderMap, body: Body, limit: usize, patience: 
 /// The body as JSON.
 ///
 /// # Errors
-/// As [`read_body`]; [`Error::UnsupportedMediaType`] unless it says that it is JSON; [`Error::Malformed`] with line and column.
+/// As [`read_body`]; [`Error::UnsupportedMediaType`] when the content type is not JSON; [`Error::Malformed`] with line and column.
 pub async fn read_json(request: Request<Body>, limit: usize, patience: Duration) -> Result<Value> {
     let (parts, body) = request.into_parts();
     let declared = parts.headers.get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok()).unwrap_or("none");

@@ -17,7 +17,7 @@ use crate::error::{Error, Result};
 use crate::job::{CancelOnDrop, Job};
 use crate::{chart, volume};
 
-/// What `POST /v1/renders` can answer with, in the order of preference when the client has none.
+/// The media types that `POST /v1/renders` can answer with, in the order of preference if the client has none.
 const OFFERS: [&str; 4] = ["application/json", "image/png", "image/x-exr", "multipart/x-mixed-replace"];
 
 /// `POST /v1/renders`.
@@ -39,7 +39,7 @@ pub(super) async fn create(State(app): State<App>, request: Request<Body>) -> Re
     Ok(response)
 }
 
-/// The job for a body: a new one, or the one that the same idempotency key made before (then `false`).
+/// The job for a body: a new one, or the one that was made with the same idempotency key before (then `false`).
 async fn submit(app: &App, headers: &HeaderMap, body: Value) -> Result<(Arc<Job>, bool)> {
     let key = headers.get("idempotency-key").and_then(|v| v.to_str().ok()).map(str::to_owned);
     let Some(key) = key else { return Ok((app.service.submit(body).await?, true)) };
@@ -59,7 +59,7 @@ async fn submit(app: &App, headers: &HeaderMap, body: Value) -> Result<(Arc<Job>
     Ok((job, true))
 }
 
-/// Waits for the final frame of a job. One that is `fresh`ly made for this request is cancelled when the client goes away.
+/// Waits for the final frame of a job. A `fresh` job, which was made for this request, is cancelled when the client goes away.
 async fn finished(app: &App, job: Arc<Job>, fresh: bool, format: &str) -> Result<Response> {
     let _guard = fresh.then(|| CancelOnDrop::new(app.service.engine(), job.clone()));
     let _permit = app.stream_permit()?;
@@ -104,7 +104,7 @@ pub(super) struct DifferenceQuery {
     with: String,
 }
 
-/// `GET /v1/renders/{id}/difference?with=…`: whether two renders are of the same picture.
+/// `GET /v1/renders/{id}/difference?with=…`: a test that two renders are of the same picture.
 pub(super) async fn difference(
     State(app): State<App>,
     Id(id): Id,

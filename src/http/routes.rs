@@ -50,7 +50,7 @@ pub(super) fn router(app: App, tokens: Tokens, origins: &[String]) -> Result<Rou
         .fallback(viewer::file)
         .method_not_allowed_fallback(|| async { Error::MethodNotAllowed })
         .with_state(app);
-    // Pictures are compressed already; a compressed stream would hold frames back.
+    // Pictures are compressed already, and a compressed stream would hold frames back.
     let compressible = DefaultPredicate::new()
         .and(NotForContentType::const_new("multipart/x-mixed-replace"))
         .and(NotForContentType::const_new("application/octet-stream"));
@@ -80,8 +80,8 @@ fn cors(origins: &[String]) -> Result<CorsLayer> {
         .expose_headers(Any))
 }
 
-/// Counts requests by route and status. Labels must not grow with what clients make up: the route's pattern, not its path,
-/// and only methods that exist.
+/// Counts requests by route and status. The number of labels must not grow with the clients' inventions, so a label has the route's pattern instead
+/// of its path, and only methods that exist.
 async fn count(path: Option<MatchedPath>, request: Request<axum::body::Body>, next: Next) -> Response {
     let method = match request.method().as_str() {
         known @ ("GET" | "HEAD" | "POST" | "PUT" | "DELETE" | "OPTIONS" | "PATCH") => known.to_owned(),

@@ -1,5 +1,5 @@
-//! Streams of a render: frames as `multipart/x-mixed-replace`, and server-sent events. Both show the latest and skip what a
-//! slow reader missed, so that nothing grows; both end with the render or with the server.
+//! Streams of a render: frames as `multipart/x-mixed-replace`, and server-sent events. Both show the latest update and skip those that a slow
+//! reader missed, so that nothing grows. Both end with the render or with the server.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -22,7 +22,7 @@ use super::problem::Id;
 use crate::error::Result;
 use crate::job::{CancelOnDrop, Frame, Job, State as JobState, Update};
 
-/// A reader of a job's updates that knows what it has shown.
+/// A reader of a job's updates. It knows the last one that it has shown.
 struct Reader {
     job: Arc<Job>,
     updates: watch::Receiver<Update>,
@@ -41,7 +41,7 @@ impl Reader {
         Ok(Self { updates: job.watch(), job, stop: app.stop.clone(), shown, over: false, _permit, _guard: guard })
     }
 
-    /// The next update with what is not shown yet, or an end; `None` after the end or when the server stops.
+    /// The next update that is not shown yet, or the end; `None` after the end or when the server stops.
     async fn next(&mut self) -> Option<Update> {
         while !self.over {
             let update = self.updates.borrow_and_update().clone();
@@ -62,8 +62,8 @@ impl Reader {
 
 const OPENING: &[u8] = b"--frame\r\n";
 
-/// A part, and the boundary behind it at once: a browser shows a part when it sees that it is over. The picture itself is
-/// shared by all readers, however many do not read.
+/// A part, with the boundary behind it at once: a browser shows a part when it sees the part's end. All readers share the picture itself, so that
+/// idle readers cost no memory.
 fn part(frame: &Frame, last: bool) -> [Bytes; 3] {
     let mut head = format!("Content-Type: image/png\r\nContent-Length: {}\r\n", frame.png.len());
     for (name, value) in frame_headers(frame) {
@@ -77,7 +77,7 @@ fn multipart(reader: Reader) -> impl Stream<Item = std::result::Result<Bytes, In
     let mut before = 0;
     let parts = stream::unfold(reader, |mut reader| async move { reader.next().await.map(|update| (update, reader)) });
     let parts = parts.filter_map(move |update| {
-        // An end without a new frame: the stream just stops.
+        // An end without a new frame just stops the stream.
         let fresh = update.frame.filter(|f| f.sequence > before);
         before = fresh.as_ref().map_or(before, |f| f.sequence);
         let pieces = fresh.map(|f| stream::iter(part(&f, update.state.is_terminal()).map(Ok)));
@@ -86,7 +86,7 @@ fn multipart(reader: Reader) -> impl Stream<Item = std::result::Result<Bytes, In
     stream::once(async { Ok(Bytes::from_static(OPENING)) }).chain(parts.flatten())
 }
 
-/// The frames of a job as a response; a render that `fresh`ly belongs to this request ends with it.
+/// The frames of a job as a response. A `fresh` job, which was made for this request, is cancelled when the response ends.
 pub(super) fn frames_of(app: &App, job: Arc<Job>, fresh: bool) -> Result<Response> {
     let guard = fresh.then(|| CancelOnDrop::new(app.service.engine(), job.clone()));
     let reader = Reader::new(app, job, 0, guard)?;
@@ -128,7 +128,7 @@ fn event(job: &Job, update: &Update) -> Event {
     Event::default().event(name).id(id).data(data.to_string())
 }
 
-/// `GET /v1/renders/{id}/events`; `Last-Event-ID` says what was seen before.
+/// `GET /v1/renders/{id}/events`; `Last-Event-ID` gives the last event that was seen.
 pub(super) async fn events(State(app): State<App>, Id(id): Id, headers: HeaderMap) -> Result<Response> {
     events_of(&app, app.render(&id)?, &headers)
 }

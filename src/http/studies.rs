@@ -1,4 +1,4 @@
-//! `/v1/studies`: what was measured, as numbers and as charts.
+//! `/v1/studies`: the measurements, as numbers and as charts.
 
 use axum::Json;
 use axum::extract::State;
@@ -17,7 +17,7 @@ use crate::study::stability::Stability;
 
 const ROOT: &str = "/v1/studies";
 
-/// Of whom comparisons with another program are, by whether the picture is lit, and what to choose then.
+/// The cases of comparisons with another program, without light and with it, and the setting to choose.
 const WHEN: [&str; 2] = ["a volume, and VTK at hand", "a volume to be lit, and VTK at hand"];
 const CHOOSE: &str = "the longest step that is wrong by no more than VTK's picture, which the chart has";
 
@@ -38,7 +38,7 @@ pub(super) async fn list(State(app): State<App>) -> Result<Json<Value>> {
     Ok(Json(listed.await.map_err(Error::internal)?))
 }
 
-/// A case in short; none that was not measured.
+/// A case in short; `None` if it was not measured.
 fn describe(name: &str, when: &str, choose: &str, results: &Results) -> Option<Value> {
     let record: Record = results.record(name)?;
     Some(json!({
@@ -66,7 +66,7 @@ fn describe_planner(found: &Planned) -> Value {
         "error_met": error_met, "in_time": in_time, "cheap": cheap})
 }
 
-/// `GET /v1/studies/{id}`: its numbers; `{id}.svg`: its chart.
+/// `GET /v1/studies/{id}`: the numbers of a study. `{id}.svg` is its chart.
 pub(super) async fn show(State(app): State<App>, Id(name): Id) -> Result<Response> {
     let (file, media) = match name.ends_with(".svg") {
         true => (name.clone(), "image/svg+xml"),

@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 
 static STATIC: Dir = include_dir!("$CARGO_MANIFEST_DIR/static");
 
-/// Nothing from elsewhere, no inline script; pictures may be blobs.
+/// The content policy: nothing from elsewhere and no inline script. Pictures may be blobs.
 const POLICY: &str = "default-src 'self'; img-src 'self' blob: data:; style-src 'self'; frame-ancestors 'none'";
 
 fn media_type(name: &str) -> &'static str {
@@ -26,7 +26,7 @@ fn media_type(name: &str) -> &'static str {
     }
 }
 
-/// Only plain names below the folder: no `..`, no absolute path, no hidden file.
+/// True if a name is plain and leads below the folder: no `..`, no absolute path, no hidden file.
 fn is_plain(name: &str) -> bool {
     name.split('/').all(|part| !part.is_empty() && !part.starts_with('.') && !part.contains(['\\', '\0', ':']))
 }

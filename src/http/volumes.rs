@@ -13,7 +13,7 @@ use super::problem::{self, Id};
 use crate::error::{Error, Result};
 use crate::volume::{RawQuery, VolumeInfo, builtin};
 
-/// Voxels a side of a built-in when it is only looked up.
+/// The voxels along a side of a built-in volume that is only looked up.
 const SHOWN_RESOLUTION: usize = 64;
 
 /// `POST /v1/volumes`.
@@ -39,10 +39,10 @@ pub(super) async fn create(State(app): State<App>, request: Request<Body>) -> Re
     Ok((status, [(header::LOCATION, location)], Json(VolumeInfo::of_upload(&id, &volume))).into_response())
 }
 
-/// A form's body is not a volume: say so instead of complaining of its bytes.
+/// Refuses the body of a form by its type, since complaints about its bytes would not help.
 fn refuse_forms(headers: &axum::http::HeaderMap) -> Result<()> {
     let declared = headers.get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok()).unwrap_or_default();
-    // curl's --data-binary says x-www-form-urlencoded unless told otherwise, so that one is let through.
+    // curl's --data-binary says x-www-form-urlencoded unless told otherwise, so that type is let through.
     if declared.starts_with("multipart/") || declared.starts_with("application/json") {
         let words =
             format!("the content type is {declared}; send the file itself as the body, as application/octet-stream");
@@ -58,7 +58,7 @@ pub(super) async fn list(State(app): State<App>) -> Result<Json<Value>> {
     Ok(Json(json!({"volumes": volumes})))
 }
 
-/// `GET /v1/volumes/{id}`, an id or the name of a built-in.
+/// `GET /v1/volumes/{id}`, where the id may be the name of a built-in volume.
 pub(super) async fn show(State(app): State<App>, Id(id): Id) -> Result<Json<VolumeInfo>> {
     let info = tokio::task::spawn_blocking(move || {
         if builtin::NAMES.contains(&id.as_str()) {

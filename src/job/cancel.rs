@@ -1,10 +1,10 @@
-//! A job that is not waited for any more, as when a client goes away, is cancelled.
+//! A guard that cancels a job that nobody waits for any more, as when a client goes away.
 
 use std::sync::Arc;
 
 use super::{Engine, Job};
 
-/// Cancels its job when it is dropped before the job's end.
+/// Cancels its job if it is dropped before the job's end.
 pub struct CancelOnDrop {
     engine: Engine,
     job: Arc<Job>,

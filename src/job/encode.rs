@@ -1,4 +1,4 @@
-//! Makes frames of a job's snapshots: error and PNG, on the runtime's blocking threads, newest first.
+//! The frames of a job, made of its snapshots: error and PNG, on the runtime's blocking threads, newest first.
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Weak};
@@ -9,11 +9,11 @@ use super::{Job, Snapshot};
 use crate::error::Error;
 use crate::film::ErrorEstimate;
 
-/// Points of the convergence trace that are kept; past this, every second one is dropped.
+/// The number of points of the convergence trace that are kept. Past it, every second point is dropped.
 const TRACE_POINTS: usize = 512;
 
-/// Runs as long as the job is kept. Snapshots that a newer one overtook are never encoded. The one place that tells of a job's end, to
-/// `ended`.
+/// Encodes frames as long as the job is kept. A snapshot that was overtaken by a newer one is never encoded. This is the one place that reports a
+/// job's end, to `ended`.
 pub(super) async fn frames(job: Weak<Job>, ended: impl Fn(&Arc<Job>)) {
     let Some((mut snapshots, mut updates)) = job.upgrade().map(|j| (j.snapshots.subscribe(), j.watch())) else {
         return;
@@ -44,7 +44,7 @@ pub(super) async fn frames(job: Weak<Job>, ended: impl Fn(&Arc<Job>)) {
         .await;
         job.encoding.store(false, Ordering::Release);
         job.snapshots.send_if_modified(|newest| {
-            // Its picture is not needed any more.
+            // The picture is not needed any more.
             newest.take_if(|newest| Arc::ptr_eq(newest, &snapshot));
             false
         });
@@ -61,8 +61,8 @@ pub(super) async fn frames(job: Weak<Job>, ended: impl Fn(&Arc<Job>)) {
 }
 
 impl Job {
-    /// Publishes a frame of `snapshot`, and with the final one of the newest camera ends the job. `true` when it ended.
-    /// A frame of the camera before is worth showing while the newest has none: cameras may come faster than frames.
+    /// Publishes a frame of `snapshot`. The final frame of the newest camera ends the job, and the result is then `true`. A frame of the camera
+    /// before is worth showing while the newest has none: cameras may come faster than frames.
     fn publish(&self, snapshot: &Snapshot, png: Vec<u8>, error: ErrorEstimate) -> bool {
         let mut progress = self.lock();
         if progress.state.is_terminal() {

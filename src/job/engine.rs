@@ -29,11 +29,11 @@ struct Inner {
 #[derive(Default)]
 struct Jobs {
     by_id: HashMap<String, Arc<Job>>,
-    /// Ended jobs, oldest first: the ones that may be forgotten.
+    /// The ended jobs, oldest first. They may be forgotten.
     ended: VecDeque<String>,
 }
 
-/// A place in the queue; given back when dropped unless a render has taken it.
+/// A place in the queue. It is given back when dropped unless a render has taken it.
 pub struct Place {
     engine: Engine,
     taken: bool,
@@ -54,7 +54,7 @@ pub struct Engine {
 }
 
 impl Engine {
-    /// An engine that has `executor` work on its jobs. Must be called within a tokio runtime, on which frames are then encoded.
+    /// An engine that has `executor` work on its jobs. It must be called within a tokio runtime, on which frames are then encoded.
     pub fn new(executor: impl Executor + 'static, limits: Limits) -> Self {
         let inner = Inner {
             executor: Box::new(executor),
@@ -72,12 +72,12 @@ impl Engine {
         self.inner.executor.readiness().borrow().clone()
     }
 
-    /// How far the kernels are.
+    /// The progress of the kernels.
     pub fn kernels(&self) -> KernelProgress {
         self.inner.executor.kernels()
     }
 
-    /// Waits until nothing is left to compile: before that, times are not those of the device alone.
+    /// Waits until nothing is left to compile. Before that, times are not those of the device alone.
     pub async fn compiled(&self) {
         while !self.kernels().is_over() {
             tokio::time::sleep(Duration::from_millis(100)).await;
@@ -87,7 +87,7 @@ impl Engine {
     /// Waits until the device is ready.
     ///
     /// # Errors
-    /// [`Error::Internal`] when it failed to become so.
+    /// [`Error::Internal`] when the device cannot be used.
     pub async fn ready(&self) -> Result<Arc<DeviceInfo>> {
         let mut readiness = self.inner.executor.readiness();
         loop {
@@ -100,7 +100,7 @@ impl Engine {
         }
     }
 
-    /// Unfinished renders.
+    /// The number of unfinished renders.
     pub fn unfinished(&self) -> usize {
         self.inner.unfinished.load(Ordering::Acquire)
     }
@@ -114,7 +114,7 @@ impl Engine {
         self.inner.jobs.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes a place in the queue, or says how full it is.
+    /// Takes a place in the queue, or fails with the number of renders in it.
     fn admit(&self) -> Result<()> {
         if self.inner.draining.load(Ordering::Acquire) {
             return Err(Error::Unavailable("the server is shutting down".into()));
@@ -128,7 +128,7 @@ impl Engine {
         took.map(drop).map_err(|waiting| Error::QueueFull { waiting, retry_after_s: 1 + waiting as u64 / 16 })
     }
 
-    /// A place in the queue, to be taken before anything is loaded for a render.
+    /// A place in the queue. It is taken before anything is loaded for a render.
     ///
     /// # Errors
     /// [`Error::QueueFull`], or [`Error::Unavailable`] while draining or without a device.
@@ -137,14 +137,14 @@ impl Engine {
         Ok(Place { engine: self.clone(), taken: false })
     }
 
-    /// Queues a render or an export. `request` is kept to be shown again, and so is what the planner said of it.
+    /// Queues a render or an export. `request` is kept to be shown again, and so is the planner's answer `planned`.
     pub fn submit(&self, mut place: Place, request: Value, task: Task, planned: Option<Value>) -> Arc<Job> {
         place.taken = true;
         self.start_job(Job::new(request, task, planned, false))
     }
 
-    /// Queues a render that nobody sees but the caller: it is not listed, and forgotten when it ends. It takes no place of its own: the
-    /// plan that it is for holds one.
+    /// Queues a render that only the caller sees: it is not listed, and it is forgotten when it ends. It takes no place of its own, since the plan
+    /// that it is for holds one.
     pub fn submit_pilot(&self, scene: Scene) -> Arc<Job> {
         self.start_job(Job::new(Value::Null, Task::Picture(Box::new(scene)), None, true))
     }
@@ -157,12 +157,12 @@ impl Engine {
         job
     }
 
-    /// Gives a render a new camera; a finished one goes through the queue again.
+    /// Gives a render a new camera. A finished render goes through the queue again.
     ///
     /// # Errors
-    /// [`Error::Conflict`] for a cancelled or failed render, [`Error::QueueFull`] when a finished one finds no place.
+    /// [`Error::Conflict`] for a cancelled or failed render, [`Error::QueueFull`] when there is no place for a finished one.
     pub fn set_camera(&self, job: &Arc<Job>, camera: Camera) -> Result<()> {
-        // A place is taken first and given back if the job turns out to hold one still.
+        // A place is taken first and given back if the job still holds one.
         let admitted = (job.state() == State::Done).then(|| self.admit()).transpose()?.is_some();
         let release = || {
             self.inner.unfinished.fetch_sub(1, Ordering::AcqRel);
@@ -188,20 +188,20 @@ impl Engine {
         Ok(())
     }
 
-    /// Cancels a render; its resource stays readable.
+    /// Cancels a render. Its resource stays readable.
     pub fn cancel(&self, job: &Arc<Job>) {
         job.cancel();
     }
 
-    /// The render or export of an id.
+    /// The render or export with an id.
     pub fn job(&self, id: &str) -> Option<Arc<Job>> {
         self.jobs().by_id.get(id).filter(|j| !j.is_pilot()).cloned()
     }
 
-    /// What a render has gathered by now, with its pixels; of one that has nothing yet once it has.
+    /// The film of a render so far, with its pixels. If the render has no samples yet, the film is awaited.
     ///
     /// # Errors
-    /// [`Error::NotFound`] where it is not kept any more.
+    /// [`Error::NotFound`] when the film is not kept any more.
     pub async fn film(&self, job: &Arc<Job>) -> Result<Arc<Film>> {
         let gone = || Error::NotFound { what: "film any more of render", id: job.id().into() };
         let (to, film) = oneshot::channel();
@@ -216,7 +216,7 @@ impl Engine {
         all
     }
 
-    /// Notes that a job ended, and forgets the oldest ended ones past the limits of what is kept.
+    /// Notes that a job ended, and forgets the oldest ended jobs past the limits.
     fn ended(&self, job: &Arc<Job>) {
         if job.is_pilot() {
             self.jobs().by_id.remove(job.id());
@@ -226,7 +226,7 @@ impl Engine {
         metrics::counter!("cloudchamber_renders_ended_total", "state" => format!("{:?}", job.state()).to_lowercase())
             .increment(1);
         let mut jobs = self.jobs();
-        // It may run again by now, or have ended twice.
+        // The job may run again by now, or may have ended twice.
         if job.state().is_terminal() && !jobs.ended.iter().any(|id| id == job.id()) {
             jobs.ended.push_back(job.id().to_owned());
         }
@@ -239,7 +239,7 @@ impl Engine {
         }
     }
 
-    /// Takes no new work from now on; returns when all renders have ended, or cancels what is left after `patience`.
+    /// Takes no new work from now on. It returns when all renders have ended, or cancels the others after `patience`.
     pub async fn drain(&self, patience: Duration) {
         self.inner.draining.store(true, Ordering::Release);
         let deadline = tokio::time::Instant::now() + patience;

@@ -1,4 +1,4 @@
-//! Who works on jobs: the device thread of this process (`run/`), or whatever else can do what [`Executor`] asks.
+//! The interface of an executor of jobs: the device thread of this process (`run/`), or anything else that implements [`Executor`].
 
 use std::sync::Arc;
 
@@ -15,20 +15,20 @@ use crate::film::Film;
 pub enum Readiness {
     /// The device is opened, and the first kernels are built.
     Starting,
-    /// The first picture can be rendered; other kernels may still be compiled, which [`Executor::kernels`] tells.
+    /// The first picture can be rendered. Other kernels may still be compiled, as [`Executor::kernels`] tells.
     Ready(Arc<DeviceInfo>),
     /// The device could not be opened, or builds no kernel.
     Failed(String),
 }
 
-/// How far the kernels are.
+/// The progress of the kernels.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct KernelProgress {
-    /// Variants that are compiled, of those
+    /// The number of variants that are compiled.
     pub built: usize,
-    /// that are compiled ahead or were asked for.
+    /// The number of variants that are compiled ahead or were asked for.
     pub of: usize,
-    /// Variants that do not build here: requests that need them are refused.
+    /// The variants that do not build here. Requests that need them are refused.
     pub failed: Vec<String>,
 }
 
@@ -39,15 +39,15 @@ impl KernelProgress {
     }
 }
 
-/// Works on the jobs that it is given, until their budget is used up, and tells their record how far they are.
+/// Works on its jobs until their budget is used up, and records their progress.
 pub trait Executor: Send + Sync {
-    /// Takes a job that is new, or that it has left and that has a new camera.
+    /// Takes a job that is new, or a job that it has left and that has a new camera.
     fn take(&self, job: &Arc<Job>);
-    /// Sends what a render has gathered by now, with its pixels; of one that has nothing yet once it has. Where it is not kept any more, `to` is
-    /// dropped.
+    /// Sends the film of a render so far, with its pixels. If the render has no samples yet, the film is sent once it has some. If the film is not
+    /// kept any more, `to` is dropped.
     fn send_film(&self, job: &Arc<Job>, to: oneshot::Sender<Result<Film>>);
-    /// Its readiness, and each change of that.
+    /// The readiness of the device, and each change of it.
     fn readiness(&self) -> watch::Receiver<Readiness>;
-    /// How far its kernels are.
+    /// The progress of its kernels.
     fn kernels(&self) -> KernelProgress;
 }

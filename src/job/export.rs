@@ -1,4 +1,4 @@
-//! What an executor tells of an export: how much is done, and its file.
+//! The record of an export: its progress, and its file.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use crate::render::ExportTask;
 use crate::technique::{self, File};
 
 impl Job {
-    /// What is exported, and how; none of a render.
+    /// The task of an export; `None` for a render.
     pub(crate) fn export(&self) -> Option<ExportTask> {
         match &self.lock().task {
             Task::File(task) => Some(ExportTask::clone(task)),
@@ -18,7 +18,7 @@ impl Job {
         }
     }
 
-    /// Notes how much of an export is done, and what the device took for it.
+    /// Notes the progress of an export and its device time.
     pub(crate) fn worked(&self, work: technique::Progress, device_ms: f64) {
         let mut progress = self.lock();
         progress.work = Some(work);

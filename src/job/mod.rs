@@ -1,8 +1,8 @@
-//! The record of a render or an export: its request, its state, its events, its reply, and what an executor tells it. The engine admits jobs to a
-//! queue, keeps them readable and hands them to an [`Executor`]; how they are worked on is none of its business.
+//! The record of a render or an export: its request, its state, its events, its reply, and the reports of its executor. The engine admits jobs to a
+//! queue, keeps them readable and hands them to an [`Executor`]. It knows nothing of the work on them.
 //!
-//! A [`Job`] is what the HTTP side and the executor share. The executor leaves snapshots of the film; a task of the async runtime encodes
-//! the newest of them as a frame (`encode.rs`); readers watch the latest frame and never hold anybody up.
+//! The HTTP side and the executor share a [`Job`]. The executor leaves snapshots of the film. A task of the async runtime encodes the newest of
+//! them as a frame (`encode.rs`). Readers watch the latest frame and never hold anybody up.
 
 mod cancel;
 mod encode;
@@ -33,15 +33,15 @@ use progress::Progress;
 pub use report::{Counts, Frame, State, Timings, TracePoint, Update};
 pub(crate) use snapshot::{SampleCounts, Snapshot};
 
-/// What a new camera means for the engine.
+/// The consequences of a new camera for the engine.
 pub(crate) struct Restart {
-    /// The executor has left the job and must be given it again.
+    /// True if the executor has left the job and must be given it again.
     pub again: bool,
-    /// It was done, so it needs a place in the queue again.
+    /// True if the job was done, so that it needs a place in the queue again.
     pub was_done: bool,
 }
 
-/// What a job makes.
+/// The product of a job.
 #[derive(Clone)]
 pub enum Task {
     /// A picture that gets better: a render.
@@ -54,17 +54,17 @@ pub enum Task {
 pub struct Job {
     id: String,
     request: Value,
-    /// What the planner said of it, where it chose it.
+    /// The planner's answer, if the planner chose the technique.
     planned: Option<Value>,
-    /// A planner's: seen by nobody else.
+    /// True if it is a planner's pilot, which nobody else sees.
     pilot: bool,
     created_unix_s: u64,
     cancelled: AtomicBool,
-    /// Nobody looks at frames before the final one.
+    /// True if nobody looks at frames before the final one.
     final_only: AtomicBool,
-    /// Its film is waited for, whatever the limit of those that are kept.
+    /// True if its film is waited for. It is then kept whatever the limit.
     film_wanted: AtomicBool,
-    /// Set while a snapshot is being encoded: the executor skips snapshots that nobody could use.
+    /// True while a snapshot is being encoded. The executor then skips snapshots, since nobody could use them.
     encoding: AtomicBool,
     progress: Mutex<Progress>,
     updates: watch::Sender<Update>,
@@ -98,7 +98,7 @@ impl Job {
         &self.id
     }
 
-    /// A poisoned lock is taken over: every change under it is a plain assignment, so nothing is ever half done.
+    /// Locks the progress. A poisoned lock is taken over: every change under it is a plain assignment, so nothing is ever half done.
     fn lock(&self) -> MutexGuard<'_, Progress> {
         self.progress.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
     }
@@ -108,7 +108,7 @@ impl Job {
     /// # Errors
     /// [`Error::Invalid`] naming the field.
     pub fn camera_from_json(&self, body: &Value) -> Result<Camera> {
-        // A copy: checking takes a while, and the executor wants the lock.
+        // The task is copied, since checking takes a while and the executor wants the lock.
         let task = self.lock().task.clone();
         match task {
             Task::Picture(scene) => scene.camera_from_json(body),
@@ -116,17 +116,17 @@ impl Job {
         }
     }
 
-    /// True if it makes a picture, and not a file.
+    /// True if the job makes a picture, and not a file.
     pub fn is_render(&self) -> bool {
         matches!(self.lock().task, Task::Picture(_))
     }
 
-    /// Where it stands.
+    /// The present state.
     pub fn state(&self) -> State {
         self.lock().state
     }
 
-    /// Its state and latest frame, and each change of them.
+    /// A receiver of its state and latest frame, and of each change of them.
     pub fn watch(&self) -> watch::Receiver<Update> {
         self.updates.subscribe()
     }
@@ -136,12 +136,12 @@ impl Job {
         self.lock().field.clone()
     }
 
-    /// What the device took for that grid, ms.
+    /// The device time of that grid, ms.
     pub(crate) fn field_ms(&self) -> f64 {
         self.lock().field_ms
     }
 
-    /// Notes that somebody looks at frames before the final one. Where nobody does, the device and the encoder are not kept busy with them.
+    /// Notes if somebody looks at frames before the final one. If nobody does, the device and the encoder do not make them.
     pub fn set_followed(&self, followed: bool) {
         self.final_only.store(!followed, Ordering::Release);
     }
@@ -150,7 +150,7 @@ impl Job {
         !self.final_only.load(Ordering::Acquire)
     }
 
-    /// Notes that somebody waits for its end to see its film, which is not let go of then.
+    /// Notes if somebody waits for its end to see its film. The film is then not dropped.
     pub fn set_film_wanted(&self, wanted: bool) {
         self.film_wanted.store(wanted, Ordering::Release);
     }
@@ -163,15 +163,15 @@ impl Job {
         self.cancelled.load(Ordering::Acquire)
     }
 
-    /// Asks for the job to end; the executor leaves it at its next slice. Says whether it was still going.
+    /// Asks for the job to end. The executor leaves it at its next slice. True if it was still going.
     pub(crate) fn cancel(&self) -> bool {
-        // Not for one that has ended: a done render may yet get a new camera.
+        // A job that has ended is not marked, since a done render may yet get a new camera.
         let ended = self.end(State::Cancelled, None);
         self.cancelled.fetch_or(ended, Ordering::AcqRel);
         ended
     }
 
-    /// What it failed by.
+    /// The error by which it failed.
     pub fn failure(&self) -> Option<Error> {
         self.lock().failure.clone()
     }
@@ -188,7 +188,7 @@ impl Job {
         true
     }
 
-    /// Puts a new camera in and forgets what was gathered for the old one.
+    /// Puts a new camera in and forgets the results of the old one.
     ///
     /// # Errors
     /// [`Error::Conflict`] for a render that was cancelled or failed.
@@ -214,13 +214,13 @@ impl Job {
         let state = progress.state;
         self.updates.send_modify(|u| {
             u.state = state;
-            // What was final is not any more.
+            // The final frame is not final any more.
             u.frame = u.frame.as_ref().map(|f| Arc::new(Frame { is_final: false, ..(**f).clone() }));
         });
         Ok(Restart { again, was_done })
     }
 
-    /// Bytes held for readers.
+    /// The bytes that are held for readers.
     pub(crate) fn bytes(&self) -> usize {
         let frame = self.updates.borrow().frame.as_ref().map_or(0, |f| f.png.len());
         let progress = self.lock();
@@ -229,7 +229,7 @@ impl Job {
             + progress.file.as_ref().map_or(0, |f| f.bytes.len())
     }
 
-    /// The request as it was posted, with what the planner put in.
+    /// The request as it was posted, with the planner's additions.
     pub fn request(&self) -> &Value {
         &self.request
     }

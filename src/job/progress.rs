@@ -1,4 +1,4 @@
-//! What changes while a job lives, and what its executor tells it.
+//! The changing part of a job, and the reports of its executor.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -14,23 +14,24 @@ use crate::render::Scene;
 use crate::technique::{self, File};
 use crate::volume::Volume;
 
-/// What changes while a job lives. One lock, held for moments.
+/// The changing part of a job. It has one lock, which is held for moments.
 pub(super) struct Progress {
     pub state: State,
-    /// Counts cameras: work for an older one is thrown away.
+    /// The number of the newest camera. Work for an older one is thrown away.
     pub generation: u64,
-    /// When the render, or its newest camera, was asked for.
+    /// The time at which the render, or its newest camera, was asked for.
     pub asked: Instant,
     pub task: Task,
-    /// True if the engine holds the job; a new camera for one that it does not hold is submitted again.
+    /// True if the executor holds the job. A job that it does not hold is submitted again with a new camera.
     pub in_engine: bool,
     pub reasons: Vec<String>,
     pub warnings: Vec<Value>,
     pub trace: Vec<TracePoint>,
     pub timings: Timings,
-    /// What the first frame of a camera took of late, ms: since that was asked for, or since the frame before where cameras wait for theirs.
+    /// The time that the first frame of a recent camera took, ms. It counts from the request for the camera, or from the frame before if that came
+    /// later.
     pub frame_ms: Option<f64>,
-    /// When the newest frame came.
+    /// The time at which the newest frame came.
     pub published: Option<Instant>,
     pub counts: Counts,
     pub samples: u32,
@@ -41,12 +42,12 @@ pub(super) struct Progress {
     pub waits_for: Option<String>,
     pub result: Option<Value>,
     pub field: Option<Arc<Volume>>,
-    /// What the device took for it, ms.
+    /// The device time of the field, ms.
     pub field_ms: f64,
-    /// The field once all its histories are in it: a new camera looks at it again.
+    /// The field once it has all its histories. A new camera looks at it again.
     pub complete_field: Option<Arc<Volume>>,
     pub sequence: u64,
-    /// How much of an export is done, and its file at the end.
+    /// The progress of an export. `file` is its file at the end.
     pub work: Option<technique::Progress>,
     pub file: Option<Arc<File>>,
 }
@@ -82,21 +83,21 @@ impl Progress {
     }
 }
 
-/// What an executor works on: the newest camera of a job.
+/// The newest camera of a job, on which an executor works.
 pub(crate) struct NewestCamera {
-    /// Counts cameras.
+    /// The number of the camera.
     pub generation: u64,
-    /// When it was asked for.
+    /// The time at which it was asked for.
     pub asked: Instant,
     pub scene: Scene,
-    /// What the first frame of the camera before took, ms.
+    /// The time that the first frame of the camera before took, ms.
     pub frame_ms: Option<f64>,
-    /// The field, where an earlier camera has looked at all of it.
+    /// The complete field, if an earlier camera has looked at all of it.
     pub complete_field: Option<Arc<Volume>>,
 }
 
 impl Job {
-    /// The newest camera, unless it is that of generation `seen`.
+    /// The newest camera, unless its generation is `seen`.
     pub(crate) fn newest_camera(&self, seen: Option<u64>) -> Option<NewestCamera> {
         let mut progress = self.lock();
         let Task::Picture(scene) = progress.task.clone() else { return None };
@@ -109,7 +110,7 @@ impl Job {
         })
     }
 
-    /// Sets the state to running; the first time notes how long the job waited.
+    /// Sets the state to running. The first time, it notes the time that the job waited.
     pub(crate) fn started(&self) {
         let mut progress = self.lock();
         progress.waits_for = None;
@@ -120,29 +121,29 @@ impl Job {
         }
     }
 
-    /// Notes which kernel it waits for.
+    /// Notes the kernel that the job waits for.
     pub(crate) fn waits_for(&self, kernel: String) {
         self.lock().waits_for = Some(kernel);
     }
 
-    /// Notes why it is planned so.
+    /// Notes the reasons for its plan.
     pub(crate) fn set_reasons(&self, reasons: Vec<String>) {
         self.lock().reasons = reasons;
     }
 
-    /// Notes what a reader should know of the volume and of the parameters on it.
+    /// Notes the warnings about the volume and the parameters on it.
     pub(crate) fn set_warnings(&self, warnings: Vec<Value>, non_finite_voxels: u64) {
         let mut progress = self.lock();
         progress.warnings = warnings;
         progress.counts.non_finite_voxels = non_finite_voxels;
     }
 
-    /// Notes one thing more that a reader should know.
+    /// Adds a warning.
     pub(crate) fn warn(&self, warning: Value) {
         self.lock().warnings.push(warning);
     }
 
-    /// Notes the grid of its field as it is, and what the device took for it; a complete one serves every camera to come.
+    /// Notes the grid of its field as it is, and the device time that it took. A complete grid serves every later camera.
     pub(crate) fn set_field(&self, field: &Arc<Volume>, complete: bool, device_ms: f64) {
         let mut progress = self.lock();
         progress.field = Some(field.clone());
@@ -152,19 +153,19 @@ impl Job {
         }
     }
 
-    /// Takes the encoder, where no snapshot is being encoded: only then is it worth while to make one.
+    /// Takes the encoder. True if no snapshot was being encoded; only then is a new one worth while.
     pub(crate) fn take_encoder(&self) -> bool {
         !self.encoding.swap(true, Ordering::AcqRel)
     }
 
-    /// Leaves a snapshot to be encoded; one that waits is replaced.
+    /// Leaves a snapshot to be encoded. It replaces one that waits.
     pub(crate) fn leave_snapshot(&self, snapshot: Snapshot) {
         self.encoding.store(true, Ordering::Release);
         self.snapshots.send_replace(Some(Arc::new(snapshot)));
     }
 
-    /// The executor is through with the job for the camera of `generation`. `false` when there is a newer camera, so
-    /// that it has to go on.
+    /// Notes that the executor has finished the job for the camera of `generation`. `false` if there is a newer camera, so that the executor has to
+    /// go on.
     pub(crate) fn leave(&self, generation: u64) -> bool {
         let mut progress = self.lock();
         let newest = progress.generation == generation;
@@ -172,7 +173,7 @@ impl Job {
         newest
     }
 
-    /// Fails for good. An internal error's text is for the log; a client learns that it happened.
+    /// Fails for good. The text of an internal error is for the log; a client learns only that it happened.
     pub(crate) fn fail(&self, error: &Error) -> bool {
         if let Error::Internal(cause) = error {
             tracing::error!(render = %self.id, %cause, "render failed");

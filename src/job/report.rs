@@ -1,4 +1,4 @@
-//! What a job says of itself: state, times, counts, trace, the latest frame.
+//! The report of a job: state, times, counts, trace, the latest frame.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use crate::film::{ErrorEstimate, Lowered};
 use crate::power_law::PowerLaw;
 use crate::technique::Progress;
 
-/// Where a render stands.
+/// The state of a render.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum State {
@@ -20,7 +20,7 @@ pub enum State {
     Done,
     /// It was cancelled.
     Cancelled,
-    /// It failed; the resource says why.
+    /// It failed; the resource has the reason.
     Failed,
 }
 
@@ -34,96 +34,96 @@ impl State {
 /// One point of the convergence trace.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct TracePoint {
-    /// Milliseconds since the render or its newest camera was asked for.
+    /// The milliseconds since the render or its newest camera was asked for.
     pub elapsed_ms: f64,
-    /// Samples per pixel of this frame.
+    /// The samples per pixel of this frame.
     pub samples: u32,
-    /// Its error.
+    /// The error of this frame.
     pub error: f64,
-    /// Pixels a sample of this frame stands for, along a side.
+    /// The pixels along a side that a sample of this frame stands for.
     pub stride: u32,
 }
 
-/// Times of a render, in milliseconds since it or its newest camera was asked for.
+/// The times of a render, in milliseconds since it or its newest camera was asked for.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Timings {
-    /// Until its first slice.
+    /// The time until its first slice.
     pub queued_ms: Option<f64>,
-    /// Until its first frame.
+    /// The time until its first frame.
     pub first_frame_ms: Option<f64>,
-    /// Time the device worked for it.
+    /// The time that the device worked for it.
     pub device_ms: f64,
-    /// Until its newest frame.
+    /// The time until its newest frame.
     pub elapsed_ms: f64,
 }
 
-/// Counts of what must never be silent.
+/// The counts of faults that must never be silent.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Counts {
-    /// Samples that were not finite; each was taken as black.
+    /// The samples that were not finite. Each was taken as black.
     pub non_finite_samples: u64,
-    /// Pixels of which a sample was not finite: their error is not known (`standard_error` of the EXR is no number there).
+    /// The pixels with a sample that was not finite. Their error is not known (`standard_error` of the EXR is NaN there).
     pub non_finite_pixels: u64,
-    /// Voxels of the volume that are not finite; they are rendered as empty.
+    /// The voxels of the volume that are not finite. They are rendered as empty.
     pub non_finite_voxels: u64,
-    /// Samples that brought more than twice the light of all that their pixel had before, from its 17th sample on.
+    /// The samples that brought more than twice the light of all earlier ones of their pixel, from its 17th sample on.
     pub fireflies: u64,
-    /// Samples that were scaled down to `clamp_luminance`,
+    /// The samples that were scaled down to `clamp_luminance`.
     pub clamped_samples: u64,
-    /// and the part of the picture's light that this took away.
+    /// The part of the picture's light that clamping took away.
     pub clamped_energy: f64,
-    /// Collisions at which a majorant was below the extinction.
+    /// The collisions at which a majorant was below the extinction.
     pub broken_majorants: u64,
-    /// Paths that were cut off after a million collisions.
+    /// The paths that were cut off after a million collisions.
     pub cut_paths: u64,
-    /// Channel values above 1 that the newest frame's PNG clips (the EXR has them).
+    /// The channel values above 1 that the newest frame's PNG clips. The EXR has them.
     pub clipped_values: u64,
 }
 
-/// What the watchers of a job see: its state and its latest frame.
+/// The state of a job and its latest frame, for its watchers.
 #[derive(Debug, Clone)]
 pub struct Update {
-    /// Where it stands.
+    /// The present state.
     pub state: State,
     /// The latest frame, if there is one.
     pub frame: Option<Arc<Frame>>,
-    /// How much of an export is done.
+    /// The progress of an export.
     pub work: Option<Progress>,
 }
 
 impl Update {
-    /// The number of what there is to show, which rises: of the frame, or how much of an export is done.
+    /// The number of the newest result, which rises: the frame's number, or the amount of an export that is done.
     pub fn sequence(&self) -> u64 {
         let of_work = self.work.map(|work| work.done);
         self.frame.as_ref().map(|frame| frame.sequence).or(of_work).unwrap_or(0)
     }
 }
 
-/// One encoded frame and what it says of itself.
+/// One encoded frame with its numbers.
 #[derive(Debug, Clone)]
 pub struct Frame {
-    /// Counts the render's frames from 1; also the id of its event.
+    /// The number of the frame among the render's, from 1. It is also the id of its event.
     pub sequence: u64,
-    /// PNG bytes.
+    /// The PNG bytes.
     pub png: bytes::Bytes,
-    /// Samples per pixel.
+    /// The samples per pixel.
     pub samples: u32,
     /// The error and its parts.
     pub error: ErrorEstimate,
-    /// What it has less of than was asked for, so that it came in time.
+    /// The quality that was reduced so that the frame came in time.
     pub lowered: Lowered,
-    /// Milliseconds since the render (or its newest camera) was asked for.
+    /// The milliseconds since the render (or its newest camera) was asked for.
     pub elapsed_ms: f64,
-    /// Milliseconds of device time so far.
+    /// The milliseconds of device time so far.
     pub device_ms: f64,
     /// True if no better frame will follow.
     pub is_final: bool,
-    /// Strong entity tag: the hash of the bytes, which hold nothing that depends on load or time.
+    /// The strong entity tag: the hash of the bytes, which hold nothing that depends on load or time.
     pub etag: String,
 }
 
-/// The power of the number of samples with which the error falls: −½ for noise. The least-squares slope of the logarithms over the
-/// frames of whole passes with two samples or more; none of fewer than three.
+/// The power of the number of samples with which the error falls: −½ for noise. It is the least-squares slope of the logarithms over the frames of
+/// whole passes with two samples or more; `None` for fewer than three of them.
 pub(super) fn slope(trace: &[TracePoint]) -> Option<f64> {
     let points: Vec<(f64, f64)> = trace
         .iter()

@@ -1,4 +1,4 @@
-//! The resources of the HTTP contract: of a render here, of an export in `export.rs`.
+//! The resources of the HTTP contract: a render's here, an export's in `export.rs`.
 
 use serde_json::{Value, json};
 
@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::render::Scene;
 
 impl Progress {
-    /// What it failed by, in words for a client.
+    /// The failure in words for a client.
     pub(super) fn failure_words(&self) -> Option<String> {
         self.failure.as_ref().map(|error| match error {
             Error::Internal(_) => "the render failed on the server".to_owned(),
@@ -33,7 +33,7 @@ impl Job {
         }
     }
 
-    /// The resource.
+    /// The whole resource of the render or export.
     pub fn resource(&self) -> Value {
         let p = self.lock();
         match &p.task {

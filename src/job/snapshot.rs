@@ -1,4 +1,4 @@
-//! What the device thread leaves of a render for others to look at.
+//! The snapshot of a render that the device thread leaves for the encoder.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -8,39 +8,39 @@ use serde_json::Value;
 use super::report::Counts;
 use crate::film::Film;
 
-/// What an executor leaves for the encoder of a job's frames.
+/// A snapshot that an executor leaves for the encoder of a job's frames.
 pub(crate) struct Snapshot {
-    /// What it says of itself, without its pixels.
+    /// The film with its sums, without its pixels.
     pub film: Arc<Film>,
-    /// Its picture in sRGB bytes.
+    /// The picture in sRGB bytes.
     pub picture: Vec<u8>,
     pub generation: u64,
-    /// True if it is its camera's first,
+    /// True if it is the first snapshot of its camera.
     pub is_first: bool,
-    /// and when it was made.
+    /// The time at which it was made.
     pub made: Instant,
     pub elapsed_ms: f64,
     pub device_ms: f64,
     pub counts: SampleCounts,
     pub result: Option<Value>,
-    /// What stopped the render, on the final snapshot.
+    /// The bound that stopped the render, on the final snapshot.
     pub stopped_by: Option<&'static str>,
 }
 
-/// What the kernels count among a picture's samples, in their order (`kernels/shared/film.h`, `kernels/shared/flight.h`).
+/// The kernels' counts of a picture's samples, in their order (`kernels/shared/film.h`, `kernels/shared/flight.h`).
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct SampleCounts {
     pub non_finite: u32,
     pub fireflies: u32,
     pub clamped: u32,
     pub broken: u32,
-    /// Sum of luminance.
+    /// The sum of luminance that was taken away.
     pub clamped_luminance: f64,
     pub cut: u32,
 }
 
 impl SampleCounts {
-    /// What a job says of them.
+    /// Puts the counts into a job's report.
     pub fn report(&self, film: &Film, counts: &mut Counts) {
         counts.clipped_values = film.sums.clipped;
         counts.non_finite_samples = self.non_finite.into();

@@ -1,4 +1,4 @@
-//! The validated request of an export: what is turned into a file, and how.
+//! The validated request of an export: the subject that is turned into a file, and the technique that does it.
 
 use std::sync::Arc;
 
@@ -54,7 +54,7 @@ impl ExportTask {
         let subject = subject::of_request(request.volume.as_ref(), None, assets, limits)?;
         let task = Self { technique, export, subject };
         if task.subject.field().is_none() {
-            // Found out here, not on the device's thread.
+            // The error is found here, and not on the device's thread.
             task.export.kernels(&task.subject)?;
         }
         Ok(task)
@@ -70,7 +70,7 @@ impl ExportTask {
         &self.export
     }
 
-    /// What is exported.
+    /// The subject of the export.
     pub fn subject(&self) -> &Subject {
         &self.subject
     }

@@ -1,5 +1,5 @@
-//! The validated request: what a render looks at, from where, how, and when it stops. Fields are private: what a [`Scene`] holds has been
-//! checked, and nothing downstream checks again.
+//! The validated request: the subject of a render, its camera, its technique and its budget. Fields are private: the contents of a [`Scene`] have
+//! been checked, and nothing downstream checks again.
 
 mod export;
 pub(crate) mod region;
@@ -25,19 +25,19 @@ use region::Region;
 pub use schema::{parameters_schema, schema};
 use shared::{own_parameters, where_it_was_given};
 
-/// The technique of a request that leaves it to the planner.
+/// The technique of a request that leaves the choice to the planner.
 pub const AUTO: &str = "auto";
-/// Pixels a side when the request is silent.
+/// The default number of pixels along a side.
 const DEFAULT_SIDE: u32 = 512;
-/// Samples when the budget is silent: enough that the jitter's noise is below a grey level in most pictures.
+/// The default number of samples: enough that the jitter's noise is below a grey level in most pictures.
 const DEFAULT_SAMPLES: u32 = 16;
 
-/// When a render stops: at the first that is reached.
+/// The budget of a render. The render stops at the first bound that is reached.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Budget {
-    /// Samples per pixel.
+    /// The samples per pixel.
     pub samples: u32,
-    /// Milliseconds since the render's start.
+    /// The milliseconds since the render's start.
     pub time_ms: Option<u64>,
     /// The error, as the film estimates it.
     pub max_error: Option<f64>,
@@ -53,7 +53,7 @@ pub struct Scene {
     level: Option<u32>,
     asked_samples: Option<u32>,
     subject: Subject,
-    /// The view of its subject, once that is there: of a field it is not.
+    /// The view of its subject; `None` while the subject is a field that is not there yet.
     prepared: Option<Arc<dyn PreparedView>>,
     camera: Camera,
     clip: Clip,
@@ -125,7 +125,7 @@ impl Scene {
         scene.prepared_for_subject()
     }
 
-    /// The scene, once its view and its subject are found to go together. Of a field that is not known before it is there.
+    /// The scene, after a check that its view and its subject go together. With a field, that is not known before the field is there.
     fn prepared_for_subject(self) -> Result<Self> {
         let prepared = match self.subject.field() {
             None => Some(self.view.prepare(&self.subject)?),
@@ -134,10 +134,10 @@ impl Scene {
         Ok(Self { prepared, ..self })
     }
 
-    /// The same picture by another of its settings.
+    /// The same picture with another of its settings.
     ///
     /// # Errors
-    /// [`Error::Invalid`] where the setting and the scene do not go together.
+    /// [`Error::Invalid`] when the setting and the scene do not go together.
     pub(crate) fn with_setting(&self, setting: &Setting) -> Result<Self> {
         let mut scene = self.clone();
         if setting.view.is_none() && setting.level.is_none() {
@@ -155,7 +155,7 @@ impl Scene {
         scene.prepared_for_subject()
     }
 
-    /// The same scene from another camera, given as the body of `PUT …/camera`.
+    /// A camera for the same scene, from the body of `PUT …/camera`.
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the field under `/camera`.
@@ -164,22 +164,22 @@ impl Scene {
         Camera::from_request(Some(&request), self.subject.bounds())
     }
 
-    /// Puts another camera in.
+    /// Sets another camera.
     pub fn set_camera(&mut self, camera: Camera) {
         self.camera = camera;
     }
 
-    /// Only these pixels of the picture, with so many samples, and with the picture as it was after fewer.
+    /// The scene as a pilot: only these pixels of the picture, with this number of samples, and with the pictures after fewer samples.
     pub(crate) fn into_pilot(self, region: Region, samples: u32) -> Self {
         Self { pilot: Some(region), budget: Budget { samples, time_ms: None, max_error: None }, ..self }
     }
 
-    /// The same with another seed.
+    /// The same scene with another seed.
     pub(crate) fn with_seed(self, seed: u64) -> Self {
         Self { seed, ..self }
     }
 
-    /// The same with another subject.
+    /// The same scene with another subject.
     ///
     /// # Errors
     /// As [`View::prepare`].
@@ -187,7 +187,7 @@ impl Scene {
         Self { subject, ..self.clone() }.prepared_for_subject()
     }
 
-    /// The view of its subject, or of what its field has become.
+    /// The view of its subject, or of the volume that its field has become.
     ///
     /// # Errors
     /// As [`View::prepare`].
@@ -199,17 +199,17 @@ impl Scene {
         }
     }
 
-    /// The samples of the budget, where the request gives them.
+    /// The samples of the budget, if the request gives them.
     pub(crate) fn asked_samples(&self) -> Option<u32> {
         self.asked_samples
     }
 
-    /// The level of the volume, where the request gives one.
+    /// The level of the volume, if the request gives one.
     pub(crate) fn level(&self) -> Option<u32> {
         self.level
     }
 
-    /// The view's own parameters as the request has them, with those that it shares.
+    /// The view's own parameters as the request has them, with the shared ones.
     pub(crate) fn given(&self) -> &Map<String, Value> {
         &self.given
     }
@@ -219,7 +219,7 @@ impl Scene {
         self.pilot.is_some()
     }
 
-    /// The pixels of the picture that it has: but for a pilot all of them.
+    /// The pixels of the picture that it has: all of them, except for a pilot.
     pub(crate) fn region(&self) -> Region {
         self.pilot.unwrap_or(Region::every(1, self.image))
     }
@@ -232,11 +232,11 @@ impl Scene {
     pub fn view(&self) -> &Arc<dyn View> {
         &self.view
     }
-    /// The technique and its own parameters as the request has them: what belongs to those alone can be kept by it.
+    /// The technique and its own parameters as the request has them. They are the key of anything that depends on them alone.
     pub(crate) fn own(&self) -> &Arc<str> {
         &self.own
     }
-    /// What is looked at.
+    /// The subject of the picture.
     pub fn subject(&self) -> &Subject {
         &self.subject
     }
@@ -248,15 +248,15 @@ impl Scene {
     pub fn clip(&self) -> &Clip {
         &self.clip
     }
-    /// What is behind the volume.
+    /// The background behind the volume.
     pub fn background(&self) -> Background {
         self.background
     }
-    /// Width and height in pixels.
+    /// The width and height in pixels.
     pub fn image(&self) -> [u32; 2] {
         self.image
     }
-    /// When to stop.
+    /// The budget.
     pub fn budget(&self) -> Budget {
         self.budget
     }
@@ -278,7 +278,7 @@ fn background(image: &ImageRequest) -> Result<Background> {
     }
 }
 
-/// A budget that names only a time or an error may take as many samples as the server permits.
+/// The budget of a request. One that names only a time or an error may take as many samples as the server permits.
 fn budget(request: &BudgetRequest, limits: &Limits) -> Budget {
     let open = request.time_ms.is_some() || request.max_error.is_some();
     let default = if open { limits.max_samples } else { DEFAULT_SAMPLES.min(limits.max_samples) };

@@ -6,12 +6,12 @@ use crate::error::{Error, Result};
 use crate::request::RenderRequest;
 use crate::technique::{self, Technique};
 
-/// The sections of the request that techniques share, where it has them.
+/// The sections of the request that techniques share, if the request has them.
 fn shared_sections(request: &RenderRequest) -> [(&'static str, &Option<Value>); 2] {
     [("medium", &request.medium), ("lights", &request.lights)]
 }
 
-/// A technique's own parameters, with the sections of the request that it shares put among them.
+/// A technique's own parameters, together with the request's shared sections.
 pub(super) fn own_parameters(technique: &Technique, request: &RenderRequest) -> Result<Value> {
     let mut own = request.parameters.get(technique.name).cloned().unwrap_or_else(|| Value::Object(Default::default()));
     for (name, shared) in shared_sections(request) {
@@ -31,7 +31,7 @@ pub(super) fn own_parameters(technique: &Technique, request: &RenderRequest) -> 
     Ok(own)
 }
 
-/// The error with the pointers that the request has, for sections that were put among a technique's own parameters.
+/// The error with the request's pointers, if it is in a shared section that was put among a technique's own parameters.
 pub(super) fn where_it_was_given(error: Error, technique: &Technique, request: &RenderRequest) -> Error {
     let shared = shared_sections(request);
     error.with_pointers(|pointer| {

@@ -1,4 +1,4 @@
-//! What a request looks at: a volume, at a level of it, or a field.
+//! The subject of a request: a volume, at a level of it, or a field.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::scene::bounds::Bounds;
 use crate::technique::{self, AskedField, Kind, Subject, Technique, Work};
 use crate::volume::{Volume, builtin};
 
-/// What a request looks at; loads the volume that it names. `own` is the box of what the view shows by itself: then no volume is needed.
+/// The subject of a request. It loads the volume that the request names. `own` is the box of a view that needs no volume.
 ///
 /// # Errors
 /// [`Error::Invalid`] with a pointer under `/volume`.

@@ -1,4 +1,5 @@
-//! How a job begins on the device thread, and begins again with a newer camera: its field, then its view, once their kernels are there.
+//! The start of a job on the device thread, and its restart with a newer camera: first its field, then its view, each once its kernels are
+//! compiled.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -16,8 +17,8 @@ use crate::technique::{AskedField, PreparedView};
 use crate::volume::Volume;
 
 impl Live {
-    /// Takes the newest camera: at the first turn, and then each one that comes after the one before has been seen. Cameras may come faster
-    /// than frames, and none would be seen.
+    /// Takes the newest camera: at the first turn, and later whenever a frame of the camera before has been handed on. Cameras may come faster than
+    /// frames, and without that rule none would be seen.
     pub(super) fn follow_camera(&mut self, context: &mut DeviceContext) -> Result<()> {
         if self.camera.is_some() && self.shown.at().is_none() {
             return Ok(());
@@ -39,7 +40,7 @@ impl Live {
         }
     }
 
-    /// Points the view at the newest camera, or begins it.
+    /// Points the view at the newest camera, or begins the view.
     fn aim(&mut self, context: &mut DeviceContext, scene: &Scene, complete: Option<Arc<Volume>>) -> Result<()> {
         if let Some(view) = &mut self.view {
             // A field that is still filling is looked at from the new camera at once.
@@ -63,7 +64,7 @@ impl Live {
             self.stage = Stage::AwaitsField;
             return Ok(());
         }
-        // A budget of time is for the work, not for compiling.
+        // The time budget covers the work, not the compilation.
         self.started = Instant::now();
         let run = FieldRun::new(context, &field)?;
         self.job.set_reasons(run.reasons().to_vec());
@@ -72,7 +73,7 @@ impl Live {
         Ok(())
     }
 
-    /// Begins the view of the subject, or of what its field has become.
+    /// Begins the view of the subject, or of the volume that its field has become.
     pub(super) fn begin_view(&mut self, context: &mut DeviceContext, field: Option<&Arc<Volume>>) -> Result<()> {
         let Some(camera) = &self.camera else { return Ok(()) };
         let prepared = camera.scene.prepared(field)?;
@@ -118,7 +119,7 @@ impl Live {
     }
 }
 
-/// True if kernels are ready. Those that are not are asked for, and the job says that it waits for the first of them.
+/// True if all kernels are ready. Missing kernels are asked for, and the job notes that it waits for the first of them.
 pub(super) fn is_ready(context: &mut DeviceContext, job: &Job, variants: &[Variant]) -> Result<bool> {
     let mut missing = None;
     for variant in variants {

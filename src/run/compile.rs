@@ -1,7 +1,7 @@
-//! Processes of this program that compile kernels into PoCL's cache: what they are told, and what they do.
+//! Processes of this program that compile kernels into PoCL's cache: their start, their protocol and their work.
 //!
-//! A line to a process is a variant's label, a line from it what came of it: nothing, or the compiler's words. One that dies has met
-//! something that LLVM cannot compile; the next variant gets a new one.
+//! The server writes a variant's label on a line, and the process answers on a line: `null`, or the compiler's message. A process that dies has met
+//! something that LLVM cannot compile; the next variant gets a new process.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::PathBuf;
@@ -13,7 +13,7 @@ use crate::device::program::Variant;
 use crate::device::{self, Device, DeviceConfig};
 use crate::error::{Error, Result};
 
-/// How such a process is started: this program and the flags that make its kernels those of the server.
+/// The command that starts such a process: this program, with the flags that make its kernels those of the server.
 #[derive(Debug, Clone)]
 pub(super) struct Compiler {
     program: PathBuf,
@@ -28,14 +28,14 @@ pub(super) struct Process {
 
 impl Drop for Process {
     fn drop(&mut self) {
-        // It may have ended by itself, which is as well.
+        // The process may have ended by itself, which is no fault.
         drop(self.child.kill());
         drop(self.child.wait());
     }
 }
 
 impl Compiler {
-    /// The one for a device that was opened with `config` and so many lanes; none where the configuration names no program.
+    /// The compiler for a device that was opened with `config` and this number of lanes; `None` if the configuration names no program.
     pub fn of(config: &DeviceConfig, lanes: u32) -> Option<Self> {
         let program = config.compiler.clone()?;
         let mut flags = vec![format!("--device={}", config.target), format!("--lanes={lanes}")];
@@ -52,8 +52,8 @@ impl Compiler {
         Ok(Process { child, lines: BufReader::new(lines).lines() })
     }
 
-    /// Compiles a variant in `process`, which is started where there is none. Where none can be started that is no fault of the
-    /// variant's: it is then built where it is used.
+    /// Compiles a variant in `process`, and starts the process if there is none. If no process can be started, the variant is not at fault: it is
+    /// then built where it is used.
     pub fn compile(&self, process: &mut Option<Process>, variant: &Variant) -> std::result::Result<(), String> {
         if process.is_none() {
             match self.start() {
@@ -81,7 +81,7 @@ impl Compiler {
     }
 }
 
-/// What such a process does: compiles the variants whose labels come in, a line each, until there are no more.
+/// The work of such a process: it reads labels, one a line, and compiles their variants, until there are no more.
 ///
 /// # Errors
 /// [`Error::Internal`] when the device cannot be opened or the pipe breaks.
@@ -96,7 +96,7 @@ pub fn compile_kernels(config: &DeviceConfig) -> Result<()> {
             None => Err(Error::internal("there is no such kernel")),
         };
         let said = serde_json::to_string(&outcome.err().map(|e| e.to_string())).map_err(Error::internal)?;
-        // Whoever asked may be gone, which is no failure.
+        // The server may have gone, which is no failure.
         if writeln!(std::io::stdout(), "{said}").is_err() {
             break;
         }

@@ -1,4 +1,4 @@
-//! What all jobs on the device thread share: the device, the volumes on it, what is compiled.
+//! The state that all jobs on the device thread share: the device, the volumes on it, and the compiled kernels.
 
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -17,19 +17,19 @@ use crate::device::{Buffer, Device, DeviceConfig, encode};
 use crate::error::{Error, Result};
 use crate::volume::Volume;
 
-/// Device memory for volumes that no job uses just now.
+/// The device memory for volumes that no job uses, bytes.
 const IDLE_VOLUME_BYTES: usize = 1 << 30;
 
 /// Everything on the device that outlives a job.
 pub(super) struct DeviceContext {
     pub device: Device,
-    /// The curve of sRGB, which films are encoded by.
+    /// The curve of sRGB by which films are encoded.
     pub curve: Rc<Buffer>,
     volumes: HashMap<usize, (Weak<Volume>, Rc<DeviceVolume>)>,
-    /// Rays a millisecond of the last pass, by kernel variant.
+    /// The rays per millisecond of the last pass, by kernel variant.
     speed: HashMap<Variant, f64>,
     kernels: Kernels,
-    /// True if processes compile them.
+    /// True if processes compile the kernels.
     compiles_ahead: bool,
 }
 
@@ -40,11 +40,11 @@ impl Drop for DeviceContext {
 }
 
 impl DeviceContext {
-    /// Opens the device with as many lanes as it likes, or with fewer where the first kernels do not build for so many.
-    /// `kernels` is told what is compiled, and compiles ahead from then on; `wake` is called as that goes on.
+    /// Opens the device with its preferred number of lanes, or with fewer if the first kernels do not build for that many. From then on, `kernels`
+    /// records the compiled variants, and processes compile ahead; they call `wake` after each variant.
     ///
     /// # Errors
-    /// [`Error::Internal`] when there is no device, or the first kernels build for no number of lanes.
+    /// [`Error::Internal`] when there is no device, or when the first kernels build for no number of lanes.
     pub fn open(config: &DeviceConfig, kernels: Kernels, wake: impl Fn() + Send + Clone + 'static) -> Result<Self> {
         let mut gave_up: Vec<String> = Vec::new();
         let mut lanes = config.lanes;
@@ -73,8 +73,8 @@ impl DeviceContext {
         }
     }
 
-    /// Lets processes compile what is likely to be asked for, where PoCL keeps what they compile; elsewhere the device thread does it
-    /// when it has nothing else to do.
+    /// Starts processes that compile the variants that are likely to be asked for, if PoCL keeps compiled kernels. Without PoCL, the device thread
+    /// compiles them while it is idle.
     fn compile_ahead(&mut self, config: &DeviceConfig, wake: impl Fn() + Send + Clone + 'static) -> Result<()> {
         for variant in sources::first() {
             self.kernels.set(&variant, true);
@@ -90,10 +90,11 @@ impl DeviceContext {
         if self.compiles_ahead { self.kernels.start(&compiler, wake) } else { Ok(()) }
     }
 
-    /// True if a variant can be run now. It is built where it is compiled, or where nobody compiles ahead; one that cannot be run yet is asked for.
+    /// True if a variant can be run now. A variant is built if it is compiled, or if no processes compile ahead. A variant that cannot be run yet
+    /// is asked for.
     ///
     /// # Errors
-    /// [`Error::Kernel`] for one that does not build on this device.
+    /// [`Error::Kernel`] for a variant that does not build on this device.
     pub fn is_ready(&mut self, variant: &Variant) -> Result<bool> {
         if self.device.is_built(variant) {
             return Ok(true);
@@ -119,13 +120,13 @@ impl DeviceContext {
         self.kernels.set(variant, built.is_ok());
     }
 
-    /// Builds one variant that is likely to be asked for, where nobody else does; whether there was one.
+    /// Builds one variant that is likely to be asked for, if no processes do so. True if there was one.
     pub fn build_ahead(&mut self) -> bool {
         let next = if self.compiles_ahead { None } else { self.kernels.take() };
         next.inspect(|variant| self.build(variant)).is_some()
     }
 
-    /// The volume on the device, uploaded and its cells built at first use.
+    /// The volume on the device. At first use it is uploaded and its macro-cells are built.
     pub fn volume(&mut self, volume: &Arc<Volume>) -> Result<Rc<DeviceVolume>> {
         let key = Arc::as_ptr(volume) as usize;
         if let Some((weak, buffer)) = self.volumes.get(&key)
@@ -152,17 +153,17 @@ impl DeviceContext {
         Ok(on_device)
     }
 
-    /// Notes how many rays a variant managed.
+    /// Notes the speed of a variant, from the rays of a pass and their time.
     pub fn measured(&mut self, variant: &Variant, rays: usize, took: Duration) {
         self.speed.insert(*variant, rays as f64 / (took.as_secs_f64() * 1e3).max(1e-3));
     }
 
-    /// How many rays a millisecond a variant managed of late, if it has run.
+    /// The rays per millisecond of a variant's last pass; `None` if it has not run.
     pub fn speed(&self, variant: &Variant) -> Option<f64> {
         self.speed.get(variant).copied()
     }
 
-    /// Lets go of volumes that are gone from the host, and of idle ones past the limit.
+    /// Drops volumes that are gone from the host, and idle volumes past the limit.
     pub fn tidy(&mut self) {
         self.volumes.retain(|_, (weak, _)| weak.strong_count() > 0);
         let idle = |v: &Rc<DeviceVolume>| Rc::strong_count(v) == 1;

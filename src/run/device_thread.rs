@@ -1,4 +1,4 @@
-//! The device thread: goes round the live jobs, a slice each.
+//! The device thread. It goes round the live jobs and gives each of them a slice.
 
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -16,30 +16,30 @@ use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::job::{Job, Readiness};
 
-/// What the device thread is told.
+/// A message to the device thread.
 pub(super) enum Command {
-    /// A render to run.
+    /// A job to run.
     Run(Arc<Job>),
-    /// Somebody wants to see a render's film.
+    /// A request for a render's film.
     Film(Arc<Job>, oneshot::Sender<Result<Film>>),
-    /// A kernel has been compiled, or cannot be.
+    /// A kernel has been compiled, or does not compile.
     Kernel,
-    /// Nobody is left to ask for anything.
+    /// Nobody can ask for anything any more.
     Stop,
 }
 
-/// What the device thread starts with.
+/// The settings and channels of a device thread.
 pub(super) struct DeviceThread {
     pub config: DeviceConfig,
     pub kernels: Kernels,
-    /// To itself, for those who compile its kernels.
+    /// The sender to itself, for the threads that compile its kernels.
     pub commands: Sender<Command>,
     pub most_live: usize,
-    /// Bytes of films of ended renders that are kept.
+    /// The bytes of films of ended renders that are kept.
     pub keep_film_bytes: usize,
 }
 
-/// What is worked on in turns.
+/// A job that takes turns on the device.
 enum Work {
     Picture(Box<Live>),
     File(Box<ExportRun>),
@@ -60,7 +60,7 @@ impl Work {
         }
     }
 
-    /// The film of a render so far, where it has one.
+    /// The film of a render so far; `None` if it has none.
     fn film(&mut self, context: &DeviceContext) -> Result<Option<Film>> {
         match self {
             Self::Picture(live) => live.film(context),
@@ -68,7 +68,7 @@ impl Work {
         }
     }
 
-    /// Ends with what a render has gathered.
+    /// Ends the work. A render leaves the samples that it has gathered.
     fn rest(self) -> Option<Rested> {
         match self {
             Self::Picture(live) => live.rest(),
@@ -82,11 +82,11 @@ impl Work {
 struct Renders {
     waiting: VecDeque<Arc<Job>>,
     live: VecDeque<Work>,
-    /// Those that wait for a kernel.
+    /// The jobs that wait for a kernel.
     parked: VecDeque<Work>,
-    /// What ended ones have gathered, the newest last.
+    /// The samples of ended renders, the newest last.
     rested: Vec<Rested>,
-    /// Who wants to see a film.
+    /// The requests for films that are not answered yet.
     asked: Vec<(Arc<Job>, oneshot::Sender<Result<Film>>)>,
 }
 
@@ -94,14 +94,14 @@ impl DeviceThread {
     /// Opens the device, then goes round the live jobs, a slice each, until it is told to stop.
     pub fn run(self, incoming: &Receiver<Command>, readiness: &watch::Sender<Readiness>) {
         let commands = self.commands.clone();
-        // Who has gone does not need to be woken.
+        // A device thread that has gone need not be woken.
         let wake = move || drop(commands.send(Command::Kernel));
         let mut context = match DeviceContext::open(&self.config, self.kernels.clone(), wake) {
             Ok(context) => context,
             Err(error) => {
                 tracing::error!(%error, "{NO_DEVICE}");
                 readiness.send_replace(Readiness::Failed(error.to_string()));
-                // Whoever got in before must not wait for ever.
+                // Jobs that were taken before must not wait for ever.
                 loop {
                     match incoming.recv() {
                         Ok(Command::Run(job)) => drop(job.fail(&Error::Unavailable(NO_DEVICE.into()))),
@@ -146,7 +146,7 @@ impl Renders {
         }
     }
 
-    /// A turn of the next.
+    /// Admits waiting jobs, then gives the next live job a turn.
     fn turn(&mut self, context: &mut DeviceContext, most_live: usize, keep_film_bytes: usize) {
         self.waiting.retain(|job| !job.state().is_terminal());
         while self.live.len() < most_live {
@@ -163,7 +163,7 @@ impl Renders {
         metrics::gauge!("cloudchamber_renders_live").set(self.live.len() as f64);
         metrics::gauge!("cloudchamber_renders_waiting").set((self.waiting.len() + self.parked.len()) as f64);
         let Some(mut current) = self.live.pop_front() else { return };
-        // A panic in one job is that job's failure and nobody else's.
+        // A panic in one job fails that job and no other.
         match catch_unwind(AssertUnwindSafe(|| current.turn(context))) {
             Ok(Ok(Turn::Again)) => self.live.push_back(current),
             Ok(Ok(Turn::Waits)) => self.parked.push_back(current),
@@ -173,7 +173,7 @@ impl Renders {
         }
     }
 
-    /// What a render is to gather in: what it gathered before, or what the oldest did where that would be let go of for it.
+    /// The memory for a render's samples: its own from before, or that of the oldest ended render, if that would be dropped for the new one.
     fn memory_for(&mut self, job: &Arc<Job>, keep_film_bytes: usize) -> Option<Rested> {
         let own = self.rested.iter().position(|r| r.is_of(job));
         let newest = self.rested.last().map_or(0, |r| r.gathered.bytes());
@@ -181,7 +181,7 @@ impl Renders {
         own.or_else(oldest).map(|at| self.rested.remove(at))
     }
 
-    /// Keeps what an ended render has gathered, and lets go of the oldest past the limit.
+    /// Keeps the samples of an ended render, and drops the oldest ones past the limit.
     fn rest(&mut self, ended: Work, keep_film_bytes: usize) {
         self.forget();
         self.rested.extend(ended.rest());
@@ -190,19 +190,21 @@ impl Renders {
         }
     }
 
-    /// The oldest that may go where all are more than `keep_film_bytes`: not the newest, however large, nor what somebody waits for.
+    /// The oldest ended render that may be dropped, if all of them take more than `keep_film_bytes`. The newest is kept, however large it is, and
+    /// so is a render whose film somebody waits for.
     fn oldest(&self, keep_film_bytes: usize) -> Option<usize> {
         let bytes: usize = self.rested.iter().map(|r| r.gathered.bytes()).sum();
         let (_, others) = self.rested.split_last().filter(|_| bytes > keep_film_bytes)?;
         others.iter().position(|r| !r.job.upgrade().is_some_and(|job| job.is_film_wanted()))
     }
 
-    /// Lets go of what nobody can ask for any more.
+    /// Drops the samples of renders that nobody can ask for any more.
     fn forget(&mut self) {
         self.rested.retain(|rested| rested.job.strong_count() > 0);
     }
 
-    /// Shows films to who asked: at once where there is something to see, else once there is; not where the render has left nothing.
+    /// Sends films to those who asked. A render with samples is answered at once, and one without samples as soon as it has some. A request for a
+    /// render that has left nothing is dropped.
     fn show(&mut self, context: &DeviceContext) {
         for (job, to) in std::mem::take(&mut self.asked) {
             let mut live = self.live.iter_mut().chain(&mut self.parked).filter(|live| Arc::ptr_eq(live.job(), &job));
@@ -215,7 +217,7 @@ impl Renders {
                 (None, None) => continue,
             };
             match film.transpose() {
-                // Who has gone does not need to be told.
+                // A receiver that has gone need not be told.
                 Some(film) => drop(to.send(film)),
                 None => self.asked.push((job, to)),
             }

@@ -1,4 +1,4 @@
-//! A volume on the device, and what was made of it for views: a client that turns a camera asks for the same again and again.
+//! A volume on the device, with the tables and distances that views have needed: a client that turns a camera asks for the same again and again.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -9,13 +9,13 @@ use crate::device::{Buffer, Device};
 use crate::error::Result;
 use crate::technique::PreparedView;
 
-/// How many of each kind are kept for a volume.
+/// The number of entries of each kind that are kept for a volume.
 const KEPT: usize = 8;
 
-/// Bytes that a kernel may read behind a table.
+/// The bytes that a kernel may read behind a table.
 const TABLE_PADDING: usize = 8;
 
-/// What was made of late, by what it was made of; that used last comes last.
+/// The most recent values with their keys. The last one used comes last.
 struct Kept<K, V>(RefCell<Vec<(K, V)>>);
 
 impl<K: PartialEq, V: Clone> Kept<K, V> {
@@ -38,13 +38,13 @@ impl<K: PartialEq, V: Clone> Kept<K, V> {
 pub(super) struct DeviceVolume {
     pub voxels: Rc<Buffer>,
     pub cells: Cells,
-    /// By intervals of raw values and the overshoot, as bits.
+    /// Distances by intervals of raw values and by the overshoot, as bits.
     distances: Kept<(Vec<[u32; 2]>, u32), Distances>,
-    /// By a technique's own parameters and the step, as bits.
+    /// Tables by a technique's own parameters and by the step, as bits.
     tables: Kept<(Arc<str>, u32), Rc<Buffer>>,
 }
 
-/// Distances, and how many cells are empty.
+/// The distances of macro-cells, and the number of empty ones.
 #[derive(Clone)]
 pub(super) struct Distances {
     pub buffer: Rc<Buffer>,
@@ -60,7 +60,7 @@ impl DeviceVolume {
         self.voxels.len() + self.cells.ranges.len()
     }
 
-    /// How far each cell is from a value in `intervals`: [`Cells::distances`].
+    /// The distance of each cell from a value in `intervals`: [`Cells::distances`].
     pub fn distances(&self, device: &mut Device, intervals: &[[f32; 2]], overshoot: f32) -> Result<Distances> {
         let key = (intervals.iter().map(|ends| ends.map(f32::to_bits)).collect(), overshoot.to_bits());
         self.distances.get_or_make(key, || {
@@ -71,13 +71,13 @@ impl DeviceVolume {
         })
     }
 
-    /// The table for a step of a view of this; `own` are the technique and its own parameters.
+    /// The table of a view of this volume for a step; `own` is the technique with its own parameters.
     pub fn table(&self, device: &Device, own: &Arc<str>, view: &dyn PreparedView, step: f32) -> Result<Rc<Buffer>> {
         self.tables.get_or_make((own.clone(), step.to_bits()), || upload_table(device, view, step))
     }
 }
 
-/// The table of a view for a step on the device.
+/// Uploads the table of a view for a step.
 pub(super) fn upload_table(device: &Device, view: &dyn PreparedView, step: f32) -> Result<Rc<Buffer>> {
     device.upload(bytemuck::cast_slice(&view.table(step)), TABLE_PADDING).map(Rc::new)
 }

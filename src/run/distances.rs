@@ -1,4 +1,4 @@
-//! What a view's kernel is told of the macro-cells: how far each is from anything that the view wants to see.
+//! The distances of macro-cells for a view's kernel: from each cell to anything that the view shows.
 
 use std::rc::Rc;
 
@@ -10,7 +10,8 @@ use crate::scene::interpolation::Interpolation;
 use crate::technique::{CellUse, ViewPlan};
 use crate::volume::Volume;
 
-/// How far each cell is from anything that the plan wants to see; a byte is enough where nothing is skipped.
+/// The distance of each cell from the values that the plan shows. They are all 0 if nothing is skipped, and `None` if the kernel reads the cells'
+/// ranges instead.
 pub(super) fn distances(
     context: &mut DeviceContext,
     on_device: &DeviceVolume,

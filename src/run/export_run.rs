@@ -1,4 +1,4 @@
-//! An export on the device thread: its field fills where it has one, then its process makes the file.
+//! An export on the device thread: its field fills if it has one, then its process makes the file.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -12,7 +12,7 @@ use crate::job::Job;
 use crate::render::ExportTask;
 use crate::technique::{File, OnDevice, Process, Subject};
 
-/// What an export does with its next turn.
+/// The stage of an export, which decides its next turn.
 enum Stage {
     /// Its subject's field begins once its kernels are compiled.
     AwaitsField,

@@ -1,4 +1,4 @@
-//! A field on the device: its process, what was seen of it, and what that says of the picture's error.
+//! A field on the device: its process, the last look at it, and the error that it causes in the picture.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -16,7 +16,7 @@ pub(super) struct FieldRun {
     process: Box<dyn Process<Look = Look>>,
     reasons: Vec<String>,
     is_over: bool,
-    /// What stands under `result` in the reply, as of the last look.
+    /// The `result` of the reply, as of the last look.
     pub result: Option<Value>,
     /// The picture of half as much work.
     half: Option<Film>,
@@ -56,20 +56,20 @@ impl FieldRun {
         Ok(step)
     }
 
-    /// Ends the process with what there is.
+    /// Ends the process with the work that is done so far.
     pub fn stop(&mut self, context: &mut DeviceContext) -> Result<()> {
         self.is_over = true;
         self.process.stop(&mut context.device)
     }
 
-    /// The grid as it is.
+    /// Reads the grid in its present state.
     pub fn look(&mut self, context: &mut DeviceContext) -> Result<Arc<Volume>> {
         let seen = self.process.look(&mut context.device)?;
         self.result = Some(seen.result);
         Ok(seen.volume)
     }
 
-    /// Another camera: the picture of the half is of the old one. The error seen from there stands in for this one's.
+    /// Forgets the picture of half the work, which is from an old camera. The error that was found from there stands in for the new camera's.
     pub fn forget_half(&mut self) {
         self.half = None;
     }

@@ -1,4 +1,4 @@
-//! What the first picture needs, built before the service is ready.
+//! The kernels of the first picture, built before the service is ready.
 
 use super::compile::Compiler;
 use super::sources;
@@ -7,8 +7,8 @@ use crate::device::Device;
 use crate::device::program::Variant;
 use crate::error::{Error, Result};
 
-/// Builds what the first picture needs. Where there is a compiler its processes go first, two at a time: what LLVM cannot compile ends
-/// those.
+/// Builds the kernels of the first picture. If there is a compiler, two of its processes compile them first, since a kernel that LLVM cannot
+/// compile then ends only that process.
 ///
 /// # Errors
 /// [`Error::Internal`] with the compiler's words.

@@ -1,4 +1,4 @@
-//! What a view has gathered so far, on the device: sets of samples, and the films that are made of them.
+//! The samples that a view has gathered on the device, and the films that are made of them.
 
 use std::collections::VecDeque;
 use std::rc::Rc;
@@ -18,30 +18,31 @@ use crate::job::SampleCounts;
 use crate::render::Scene;
 use crate::technique::{Random, ViewPlan};
 
-/// Stride of the control by the picture's shorter side: from 400 on, from 200 on, below. A thousand pixels and more tell the error.
+/// The stride of the control if the picture's shorter side has at least 400 pixels, at least 200, or fewer. A thousand pixels and more tell the
+/// error.
 const CONTROL: [usize; 3] = [8, 4, 2];
 
-/// Which layer a pass goes to.
+/// The layer that a pass samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Pass {
     Control,
     Main,
-    /// A picture that is in time while the camera moves.
+    /// The picture of a moving camera, reduced so that it is in time.
     Moving,
 }
 
-/// What a view has gathered.
+/// The samples of a view.
 pub(super) struct Gathered {
-    /// Size of the picture.
+    /// The size of the picture.
     pub size: [usize; 2],
-    /// The control, and the passes proper.
+    /// The control, and the layer of the main passes.
     pub layers: [Layer; 2],
-    /// A picture that is in time while the camera moves.
+    /// The picture of a moving camera, reduced so that it is in time.
     pub moving: Option<Moving>,
     pub rounds: Rounds,
-    /// What the kernels count.
+    /// The kernels' counters.
     pub counts: Buffer,
-    /// Relative change of the picture since the field had half its histories.
+    /// The relative change of the picture since the field had half its histories.
     pub field_error: Option<f64>,
     random: Option<Random>,
     paired: bool,
@@ -49,16 +50,15 @@ pub(super) struct Gathered {
     opacity_threshold: f64,
     background: Background,
     encoder: Encoder,
-    /// What was encoded last, as long as it is what there is to see.
+    /// The last encoded film, as long as it is the one to show.
     encoded: Option<Film>,
-    /// What the kernels had counted then.
+    /// The kernels' counters at that time.
     pub counted: SampleCounts,
 }
 
 impl Gathered {
-    /// Room for what `plan` makes of a scene, with the tables of twice its step and of its step, in the memory of what was gathered `before`
-    /// where that is as large; `paired` says whether a sample of the control differs from the one of its number in the passes proper by
-    /// its step alone.
+    /// Room for the samples that `plan` takes of a scene, with the tables of twice its step and of its step. The memory of `before` is used again
+    /// if it has the same size. `paired` is true if a sample of the control differs from the main sample of the same number by its step alone.
     pub fn new(
         context: &mut DeviceContext,
         scene: &Scene,
@@ -98,7 +98,7 @@ impl Gathered {
         })
     }
 
-    /// Forgets what was gathered: another camera.
+    /// Forgets the samples, as for another camera.
     pub fn restart(&mut self, context: &DeviceContext) -> Result<()> {
         context.device.write(&mut self.counts, 0, &[0; 32])?;
         self.layers.iter_mut().try_for_each(|layer| layer.restart(&context.device))?;
@@ -107,12 +107,12 @@ impl Gathered {
         Ok(())
     }
 
-    /// Samples per pixel of the passes proper.
+    /// The samples per pixel of the main passes.
     pub fn samples(&self) -> u32 {
         self.layers[1].samples
     }
 
-    /// Bytes on the device.
+    /// The bytes on the device.
     pub fn bytes(&self) -> usize {
         let moving = self.moving.as_ref().map_or(0, |m| m.layer.buffer.len());
         self.layers.iter().map(|l| l.buffer.len()).sum::<usize>() + self.encoder.bytes() + moving
@@ -130,16 +130,16 @@ impl Gathered {
         }
     }
 
-    /// Which pass is next.
+    /// The next pass.
     pub fn next_pass(&self) -> Pass {
         if self.moving.as_ref().is_some_and(|m| m.layer.samples == 0) && self.samples() == 0 {
             return Pass::Moving;
         }
         let [control, main] = &self.layers;
         let owed = match main.samples {
-            // The first picture; there is nothing to control.
+            // Without a step the control is only the first picture: there is no error of a step to control.
             _ if self.stepless => 1,
-            // Paired with the passes proper: only so does noise not pass for the step's doing, nor hide it.
+            // A paired control gets as many samples as the main layer. Otherwise noise would pass for the step's error, or hide it.
             n if self.paired => n + 1,
             0 | 1 => 1,
             n => 1 + n.ilog2(),
@@ -147,7 +147,7 @@ impl Gathered {
         if control.samples < owed { Pass::Control } else { Pass::Main }
     }
 
-    /// What there is to see: the passes proper, or before the first of them the picture that is in time, or the control.
+    /// The layer to show: the main one, or before its first pass the picture of the moving camera, or else the control.
     fn shown(&self) -> Pass {
         match &self.moving {
             _ if self.samples() > 0 => Pass::Main,
@@ -161,12 +161,12 @@ impl Gathered {
         self.layer(self.shown()).samples > 0
     }
 
-    /// What there is to see is about to be another.
+    /// Notes that the picture to show is about to change.
     pub fn will_change(&mut self) {
         self.encoded = None;
     }
 
-    /// Encodes what there is to see, unless that has been done: what it says of itself, without its pixels.
+    /// Encodes the picture to show, unless that has been done. The film has the picture's sums, but not its pixels.
     pub fn encode(&mut self, context: &DeviceContext) -> Result<Film> {
         let film = match self.encoded.take() {
             Some(film) => film,
@@ -178,7 +178,7 @@ impl Gathered {
 
     fn encode_anew(&mut self, context: &DeviceContext) -> Result<Film> {
         let pass = self.shown();
-        // Of one sample a pixel has no deviation: it tells only where that sample was not finite.
+        // A single sample per pixel has no deviation. Its deviations only mark the pixels whose sample was not finite.
         self.counted = self.read_counts(context)?;
         let Self { layers, moving, encoder, counted, .. } = self;
         let shown = layer(layers, moving.as_ref(), pass);
@@ -223,7 +223,7 @@ impl Gathered {
         self.encoder.picture(&context.device)
     }
 
-    /// What there is to see, with its pixels.
+    /// The film to show, with its pixels.
     pub fn film(&mut self, context: &DeviceContext) -> Result<Film> {
         let mut film = self.encode(context)?;
         let deviations = film.main.count > 1 || film.main.tiles.is_some() || film.sums.unknown > 0;
@@ -232,7 +232,7 @@ impl Gathered {
         Ok(film)
     }
 
-    /// After a pass proper: keeps what the picture is, where its halves are to be compared.
+    /// Keeps the picture after a main pass, if its halves are to be compared.
     pub fn keep_round(&mut self, context: &DeviceContext, device_time: Duration) -> Result<()> {
         self.rounds.passed(context, &self.layers[1], device_time)
     }

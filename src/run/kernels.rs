@@ -1,8 +1,8 @@
-//! Which kernel variants can be run, and the processes that compile them while the device works.
+//! The state of all kernel variants, and the processes that compile them while the device works.
 //!
-//! PoCL compiles one kernel at a time in a process, holds launches up meanwhile, and takes the process with it where LLVM gives up. So
-//! processes of this program (`compile.rs`) fill PoCL's cache, from which a variant is built in a moment. A request waits for
-//! the one that it needs, which comes before those that are only likely to be asked for.
+//! PoCL compiles one kernel at a time in a process, delays launches meanwhile, and takes the process with it if LLVM gives up. So processes of this
+//! program (`compile.rs`) fill PoCL's cache, from which a variant is built in a moment. A request waits for the variant that it needs, which is
+//! compiled before those that are only likely to be asked for.
 
 use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -12,24 +12,24 @@ use crate::device::program::Variant;
 use crate::error::{Error, Result};
 use crate::job::KernelProgress;
 
-/// Processes that compile at the same time, on machines that have the cores.
+/// The number of processes that compile at the same time, on machines that have the cores.
 const MOST_PROCESSES: usize = 4;
 
-/// What is known of a variant.
+/// The state of a variant.
 #[derive(Debug, Clone, PartialEq)]
 enum Status {
-    /// It is in the queue,
+    /// It is in the queue.
     Asked,
-    /// or a process is at it.
+    /// A process compiles it.
     AtWork,
-    /// It can be built in a moment, or is.
+    /// It can be built in a moment, or is built.
     Compiled,
     Failed,
 }
 
 #[derive(Default)]
 struct State {
-    /// What requests wait for, then what is likely to be asked for.
+    /// The variants that requests wait for, then those that are likely to be asked for.
     queue: VecDeque<Variant>,
     status: HashMap<Variant, Status>,
     closed: bool,
@@ -43,7 +43,7 @@ impl State {
     }
 }
 
-/// The state with its lock, shared with the threads that have a compiling process each.
+/// The state with its lock. The threads that each have a compiling process share it.
 #[derive(Clone, Default)]
 pub(super) struct Kernels {
     shared: Arc<(Mutex<State>, Condvar)>,
@@ -54,7 +54,7 @@ impl Kernels {
         self.shared.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Lets processes of `compiler` compile what is asked for; `wake` is called after each.
+    /// Lets processes of `compiler` compile the variants that are asked for. They call `wake` after each.
     ///
     /// # Errors
     /// [`Error::Internal`] when no thread can be started.
@@ -71,7 +71,7 @@ impl Kernels {
                     }
                     kernels.set(&variant, outcome.is_ok());
                     wake();
-                    // A process that has nothing to do keeps a compiler's memory for nothing.
+                    // An idle process would keep a compiler's memory for nothing.
                     if kernels.is_idle() {
                         process = None;
                     }
@@ -105,7 +105,7 @@ impl Kernels {
         }
     }
 
-    /// Asks for a variant to be compiled; an urgent one comes first.
+    /// Asks for a variant to be compiled. An urgent one comes first.
     pub fn ask(&self, variant: &Variant, urgent: bool) {
         let mut state = self.lock();
         match state.status.get(variant) {
@@ -122,7 +122,7 @@ impl Kernels {
         self.shared.1.notify_one();
     }
 
-    /// Notes that a variant is compiled, or cannot be.
+    /// Notes that a variant is compiled, or that it does not compile.
     pub fn set(&self, variant: &Variant, compiled: bool) {
         let status = if compiled { Status::Compiled } else { Status::Failed };
         let mut state = self.lock();
@@ -130,7 +130,7 @@ impl Kernels {
         state.status.insert(*variant, status);
     }
 
-    /// True if a variant is compiled; `None` while that is not known.
+    /// True if a variant is compiled, false if it does not compile; `None` while that is not known.
     pub fn is_compiled(&self, variant: &Variant) -> Option<bool> {
         match self.lock().status.get(variant) {
             Some(Status::Compiled) => Some(true),
@@ -139,7 +139,7 @@ impl Kernels {
         }
     }
 
-    /// How far they are.
+    /// The progress of the compilation.
     pub fn progress(&self) -> KernelProgress {
         let state = self.lock();
         let with = |wanted: Status| state.status.iter().filter(move |(_, s)| **s == wanted);

@@ -1,4 +1,4 @@
-//! One set of samples of a view on the device, and which of its pixels a pass samples.
+//! One set of samples of a view on the device, and the choice of the pixels that a pass samples.
 
 use std::rc::Rc;
 
@@ -17,24 +17,24 @@ pub(super) struct Layer {
     pub width: usize,
     pub height: usize,
     pub stride: usize,
-    /// The same in the picture asked for: longer than in the film's where that is a pilot's.
+    /// The stride in the requested picture. It is longer than `stride` if the film is a pilot's.
     pub picture_stride: usize,
     pub samples: u32,
     /// The kernel's table for its step.
     pub table: Rc<Buffer>,
     /// Its step, world units.
     pub step: f32,
-    /// Tells its random numbers from the others'.
+    /// The number of its random stream, which no other layer of the view has.
     pub stream: u32,
-    /// Of a view that renders tiles: what its passes sample.
+    /// The tiles that its passes sample, if the view renders tiles.
     tiling: Option<(Tiling, Buffer)>,
 }
 
 impl Layer {
-    /// Room for every `stride`-th pixel of a scene's picture, or of the pixels of it that a pilot has; `room` itself where that is as large.
+    /// Room for every `stride`-th pixel of a scene's picture, or of a pilot's pixels. It is `room` itself if that has the same size.
     ///
     /// # Errors
-    /// [`crate::error::Error::Internal`] when the device has none.
+    /// [`crate::error::Error::Internal`] when the device has no room.
     pub fn new(
         device: &Device,
         scene: &Scene,
@@ -57,7 +57,7 @@ impl Layer {
         Ok(Self { buffer, width, height, stride, picture_stride, samples: 0, table, step, stream, tiling })
     }
 
-    /// Forgets what was gathered.
+    /// Forgets the samples.
     pub fn restart(&mut self, device: &Device) -> Result<()> {
         self.samples = 0;
         if let Some((tiling, buffer)) = &mut self.tiling {
@@ -67,7 +67,7 @@ impl Layer {
         Ok(())
     }
 
-    /// A pass is over.
+    /// Notes that a pass is over.
     pub fn passed(&mut self) {
         self.samples += 1;
         if let Some((tiling, _)) = &mut self.tiling {
@@ -75,12 +75,12 @@ impl Layer {
         }
     }
 
-    /// What a kernel is told of the tiles.
+    /// The list of tiles for a kernel.
     pub fn tiles(&self) -> Option<&Buffer> {
         self.tiling.as_ref().map(|(_, buffer)| buffer)
     }
 
-    /// Tells the device which tiles the next pass samples; an adaptive one those with the more noise the more often.
+    /// Tells the device the tiles of the next pass. An adaptive pass samples tiles with more noise more often.
     pub fn choose_tiles(&mut self, context: &DeviceContext, adaptive: bool) -> Result<()> {
         let samples = self.samples;
         if adaptive && self.tiling.as_ref().is_some_and(|(t, _)| t.is_due(samples)) {
@@ -100,7 +100,7 @@ impl Layer {
         Ok(())
     }
 
-    /// Work-items of a pass, and about how many rays each has.
+    /// The work-items of a pass, and the approximate number of rays of each.
     pub fn items(&self, lanes: usize) -> (usize, usize) {
         if let Some((tiling, _)) = &self.tiling {
             return tiling.items(lanes);
@@ -109,7 +109,7 @@ impl Layer {
         (self.width.div_ceil(beam_w) * self.height.div_ceil(beam_h), beam_w * beam_h)
     }
 
-    /// What was gathered, without its values.
+    /// The description of the samples, without their values.
     pub fn unread(&self) -> Samples {
         Samples {
             width: self.width,
@@ -121,7 +121,7 @@ impl Layer {
         }
     }
 
-    /// What was gathered, with the squared deviations of the samples or without.
+    /// The samples, with or without their squared deviations.
     pub fn read(&self, context: &DeviceContext, deviations: bool) -> Result<Samples> {
         let pixels = self.width * self.height;
         let mut samples = self.unread();
@@ -135,7 +135,7 @@ impl Layer {
     }
 }
 
-/// Pixels across and down of a work-item: `BEAM_W` × `TILE_W` and `BEAM_H` × `TILE_H` of `kernels/shared/beam.h`.
+/// The pixels across and down of a work-item: `BEAM_W` × `TILE_W` and `BEAM_H` × `TILE_H` of `kernels/shared/beam.h`.
 fn beam_pixels(lanes: usize) -> [usize; 2] {
     match lanes {
         16 => [8, 8],
@@ -145,7 +145,7 @@ fn beam_pixels(lanes: usize) -> [usize; 2] {
     }
 }
 
-/// Packets of a work-item: `PACKETS` of `kernels/shared/beam.h`.
+/// The packets of a work-item: `PACKETS` of `kernels/shared/beam.h`.
 pub(super) fn packets_of_beam(lanes: usize) -> usize {
     let [width, height] = beam_pixels(lanes);
     width * height / lanes

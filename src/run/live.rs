@@ -1,4 +1,4 @@
-//! A job on the device thread: its stage, and what it does with a turn.
+//! A job on the device thread: its stage, and its turns.
 
 use std::sync::{Arc, Weak};
 use std::time::{Duration, Instant};
@@ -13,20 +13,20 @@ use crate::film::Film;
 use crate::job::{Job, NewestCamera};
 use crate::technique::PreparedView;
 
-/// A turn of a field: its packets end at very different times, and a longer slice wastes fewer lanes on the last of them.
+/// The slice of a field. Its packets end at very different times, and a longer slice wastes fewer lanes on the last of them.
 pub(super) const FIELD_SLICE: Duration = Duration::from_millis(40);
 
-/// What a turn came to.
+/// The outcome of a turn.
 pub(super) enum Turn {
     /// There is more to do.
     Again,
     /// Nothing can be done before a kernel is compiled.
     Waits,
-    /// The device is through with the job.
+    /// The device has finished the job.
     Over,
 }
 
-/// What a job does with its next turn.
+/// The stage of a job, which decides its next turn.
 pub(super) enum Stage {
     /// Nothing has begun.
     New,
@@ -36,31 +36,31 @@ pub(super) enum Stage {
     Fills,
     /// The view begins once its kernels are compiled.
     AwaitsView(Arc<dyn PreparedView>),
-    /// The view makes one picture of a field that is not complete, which then goes on.
+    /// The view makes one picture of an incomplete field. Then the field goes on.
     Looks,
     /// The view refines the picture until its budget is used up.
     Refines,
 }
 
-/// How far the newest camera's frames are.
+/// The progress of the newest camera's frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Shown {
-    /// There is none.
+    /// There is no frame.
     Nothing,
     /// The picture of a moving camera is there. It waits until the frame before is encoded.
     Waits,
-    /// The newest was handed on then.
+    /// The newest frame was handed on at this time.
     At(Instant),
 }
 
 impl Shown {
-    /// When the newest frame was handed on.
+    /// The time at which the newest frame was handed on.
     pub fn at(self) -> Option<Instant> {
         if let Self::At(when) = self { Some(when) } else { None }
     }
 }
 
-/// What is left of a job that has ended.
+/// The samples of a job that has ended.
 pub(super) struct Rested {
     pub job: Weak<Job>,
     pub gathered: Gathered,
@@ -77,21 +77,21 @@ impl Rested {
 pub(super) struct Live {
     pub(super) job: Arc<Job>,
     pub(super) stage: Stage,
-    /// The camera that is worked on; none before the first turn.
+    /// The camera that is worked on; `None` before the first turn.
     pub(super) camera: Option<NewestCamera>,
     pub(super) started: Instant,
     pub(super) field: Option<FieldRun>,
     pub(super) view: Option<ViewRun>,
-    /// What was gathered earlier, here or for another job: memory for what comes.
+    /// Samples that were gathered earlier, here or for another job: their memory is for the next ones.
     pub(super) memory: Option<Gathered>,
-    /// What the device took for pictures of the field while it was less complete.
+    /// The device time of pictures of the field while it was less complete.
     pub(super) earlier_time: Duration,
     pub(super) motion: Motion,
     pub(super) shown: Shown,
 }
 
 impl Live {
-    /// A job, with memory for what it gathers: its own of an earlier camera, or another's.
+    /// A job with memory for its samples: its own of an earlier camera, or another job's.
     pub fn new(job: Arc<Job>, rested: Option<Rested>) -> Self {
         let own = rested.as_ref().is_some_and(|r| r.is_of(&job));
         let (memory, motion) = rested.map(|r| (r.gathered, r.motion)).unzip();
@@ -113,15 +113,15 @@ impl Live {
         &self.job
     }
 
-    /// The film so far, with its pixels; none where there is nothing yet, or a pass is under way.
+    /// The film so far, with its pixels; `None` if there is nothing yet, or while a pass is under way.
     pub fn film(&mut self, context: &DeviceContext) -> Result<Option<Film>> {
         let between = self.view.as_mut().filter(|v| v.is_between_passes());
         let gathered = between.map(|v| &mut v.gathered).filter(|g| g.is_something());
         gathered.map(|g| g.film(context)).transpose()
     }
 
-    /// Ends with what was gathered, which stays on the device. Of a render that was cancelled within a pass some pixels have a sample more than
-    /// it says, so that their error is a little less than it says.
+    /// Ends with the samples so far, which stay on the device. If a render was cancelled within a pass, some pixels have one sample more than it
+    /// says, so that their error is a little less than it says.
     pub fn rest(self) -> Option<Rested> {
         let gathered = self.view?.gathered;
         let job = Arc::downgrade(&self.job);

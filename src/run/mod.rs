@@ -1,7 +1,7 @@
-//! What works on jobs: the device thread, which goes round the live jobs, a slice each, and compiles kernels beside that.
+//! The execution of jobs. The device thread goes round the live jobs and gives each of them a slice, while processes compile kernels beside it.
 //!
-//! A live job has a stage (`live.rs`): its field fills (`field_run.rs`), its view makes a picture of the field on the way, or its view
-//! refines the picture (`view_run.rs`) until its budget is used up (`stopping.rs`).
+//! A live job has a stage (`live.rs`): its field fills (`field_run.rs`), its view makes a picture of the incomplete field, or its view refines the
+//! picture (`view_run.rs`) until its budget is used up (`stopping.rs`).
 
 mod begin;
 mod compile;
@@ -76,7 +76,7 @@ impl DeviceExecutor {
 
 impl Drop for DeviceExecutor {
     fn drop(&mut self) {
-        // A device thread that has ended by itself needs no telling.
+        // A device thread that has ended by itself need not be told.
         drop(self.commands.send(Command::Stop));
     }
 }

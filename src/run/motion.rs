@@ -1,4 +1,4 @@
-//! A picture while the camera moves: what is lowered of it, so that frames keep coming.
+//! The picture while the camera moves. Its quality is reduced so that frames keep coming.
 
 use std::rc::Rc;
 
@@ -9,26 +9,26 @@ use crate::error::Result;
 use crate::film::{Film, Lowered};
 use crate::render::Scene;
 
-/// A frame to the next: as often as most screens show one, where that loses no more than [`MOST_LOSS`], with room for what goes wrong;
+/// The time of a frame in a smooth motion, ms: the rate of most screens, with room for delays. It applies if it loses no more than [`MOST_LOSS`].
 const SMOOTH_MS: f64 = 16.0;
-/// else 30 a second.
+/// The time of a frame in any other motion, ms: about 30 frames per second.
 const STEADY_MS: f64 = 32.0;
-/// The device's part of that: at first, at least, at most.
+/// The device's part of a frame's time, ms: the first value, the least and the greatest.
 const SMOOTH_DEVICE_MS: [f64; 3] = [13.0, 2.0, 14.0];
 const STEADY_DEVICE_MS: [f64; 3] = [25.0, 5.0, 29.0];
-/// What a smooth motion may lose, relative.
+/// The greatest relative loss of a smooth motion.
 const MOST_LOSS: f64 = 0.09;
-/// How much the device's part may change from one frame to the next: down at once, up slowly, so that pictures do not change to and fro.
+/// The factors by which the device's part may change between frames: it falls at once and rises slowly, so that pictures do not change to and fro.
 const CHANGE: [f64; 2] = [0.9, 1.03];
-/// Pixels that a sample stands for along a side, at most.
+/// The greatest stride of a moving picture: the pixels along a side that a sample stands for.
 const MOST_STRIDE: u32 = 16;
-/// Steps that are tried, of the one asked for.
+/// The steps that are tried, relative to the requested one.
 const STEPS: [f32; 3] = [1.0, 2.0, 4.0];
 
-/// Tells its random numbers from those of the passes at rest.
+/// The random stream of moving pictures. The passes at rest have others.
 const STREAM: u32 = 2;
 
-/// A frame's time, and what of it is left for the device by encoding and by whoever else works here.
+/// The time of a frame, and the device's part of it. The rest is for the encoder and for other work on the machine.
 struct Deadline {
     frame_ms: f64,
     device_ms: f64,
@@ -41,19 +41,19 @@ impl Deadline {
         Self { frame_ms, device_ms, least, most }
     }
 
-    /// It was not tried: a busy neighbour goes.
+    /// Raises the device's part after a frame that did not try this deadline: a busy neighbour may have gone.
     fn forget(&mut self) {
         self.device_ms = (self.device_ms * CHANGE[1]).min(self.most);
     }
 
-    /// The last frame took so long.
+    /// Learns from the time of the last frame.
     fn learn(&mut self, took_ms: f64) {
         let change = (self.frame_ms / took_ms.max(1.0)).clamp(CHANGE[0], CHANGE[1]);
         self.device_ms = (self.device_ms * change).clamp(self.least, self.most);
     }
 }
 
-/// What is known while a camera moves.
+/// The deadlines and losses that are known while a camera moves.
 pub(super) struct Motion {
     smooth: Deadline,
     steady: Deadline,
@@ -72,7 +72,7 @@ impl Motion {
         }
     }
 
-    /// The first frame of the camera before took so long.
+    /// Learns from the time of the first frame of the camera before.
     pub fn learn(&mut self, frame_ms: f64) {
         if self.is_smooth {
             self.smooth.learn(frame_ms);
@@ -82,14 +82,13 @@ impl Motion {
         }
     }
 
-    /// Learns what the parts of a picture are worth, from one of a single sample a pixel: of more, places within steps average out what the step
-    /// loses.
+    /// Learns the losses from a picture of a single sample per pixel. With more samples, the places within steps would average out the step's loss.
     pub fn see(&mut self, film: &Film) {
         self.losses = Losses::of(film).or(self.losses);
     }
 
-    /// What is lowered of a picture of so many rays that take `ray_ms` each, and what its longer step loses: what loses the least of all
-    /// that is in time; nothing where the whole is. Of unknown losses all are alike.
+    /// The reduction of a picture of `rays` rays that take `ray_ms` each, and the loss of its longer step. It loses the least of all reductions
+    /// that are in time; nothing is reduced if the whole picture is in time. Unknown losses are taken to be equal.
     pub fn least(&mut self, rays: f64, ray_ms: f64, stepless: bool) -> (Lowered, f64) {
         self.is_smooth = true;
         if rays * ray_ms <= self.smooth.device_ms {
@@ -108,42 +107,41 @@ impl Motion {
 }
 
 impl Lowered {
-    /// The part of the time that is left, as it was measured on two scans, lit and not: rays that are further from each other have less in common, and
-    /// longer steps share what a ray costs besides.
+    /// The part of the time that is left, as measured on two scans with and without lighting. Rays that are farther apart have less in common, and
+    /// a ray with longer steps keeps its fixed cost.
     fn cost(&self) -> f64 {
         f64::from(self.stride).powf(-1.4) * f64::from(self.step).powf(-0.7)
     }
 }
 
-/// What less of each would cost the picture, relative, as the last one at rest shows it.
+/// The relative loss of each reduction, as the last picture at rest shows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Losses {
-    /// Half the resolution.
+    /// The loss of half the resolution.
     resolution: f64,
-    /// Twice the step; none where the step plays no part.
+    /// The loss of twice the step; `None` if the step plays no part.
     step: Option<f64>,
 }
 
 impl Losses {
-    /// Of a whole picture of a single sample a pixel.
+    /// The losses that a whole picture of a single sample per pixel shows.
     fn of(film: &Film) -> Option<Self> {
         let is_whole = film.main.count == 1 && film.lowered.is_none();
         is_whole.then(|| Self { resolution: film.resolution_loss(), step: film.step_loss_seen() })
     }
 
-    /// What is lost; edges are assumed of the pixels.
+    /// The loss of a reduction. The loss of resolution is taken to come from edges, and grows with the stride.
     fn of_lowered(&self, lowered: Lowered) -> f64 {
         let pixels = self.resolution * f64::from(lowered.stride - 1);
         pixels.hypot(self.of_step(lowered.step))
     }
 
-    /// What a longer step alone loses: midpoints are of second order.
+    /// The loss of a longer step alone: midpoints are of second order.
     fn of_step(&self, step: f32) -> f64 {
         self.step.unwrap_or(0.0) * (f64::from(step * step) - 1.0) / 3.0
     }
 
-    /// What is lowered of a picture of so many rays that take `ray_ms` each: what loses least of all that is in time; nothing where nothing
-    /// need be.
+    /// The reduction with the least loss of all that are in time, for `rays` rays that take `ray_ms` each. It is none if none is needed.
     fn least(&self, rays: f64, ray_ms: f64, device_ms: f64) -> Lowered {
         let steps = if self.step.is_some() { &STEPS[..] } else { &STEPS[..1] };
         let all = (1..=MOST_STRIDE).flat_map(|stride| steps.iter().map(move |step| Lowered { stride, step: *step }));
@@ -154,16 +152,16 @@ impl Losses {
     }
 }
 
-/// The first picture of a camera, where all of it would be late.
+/// The first picture of a camera, if the whole picture would be late.
 pub(super) struct Moving {
     pub layer: Layer,
     pub lowered: Lowered,
-    /// What its longer step loses, relative.
+    /// The relative loss of its longer step.
     pub step_loss: f64,
 }
 
 impl Moving {
-    /// Room for it; that of the camera `before` where it is as large.
+    /// Room for it. The layer of the camera `before` is used again if it is the same, or its memory if that has the same size.
     ///
     /// # Errors
     /// [`crate::error::Error::Internal`] when the device has none.
@@ -189,7 +187,7 @@ impl Moving {
         Ok(Self { layer, lowered, step_loss })
     }
 
-    /// What a ray of the whole picture takes, where that has so many and a pass took `pass_ms`.
+    /// The time of a ray of the whole picture, if that has `rays` rays and a pass of this picture took `pass_ms`.
     pub fn ray_ms(&self, pass_ms: f64, rays: usize) -> f64 {
         pass_ms / rays as f64 / self.lowered.cost()
     }
@@ -202,19 +200,19 @@ mod tests {
     #[test]
     fn what_matters_least_is_lowered_and_no_more_than_need_be() {
         let losses = Losses { resolution: 0.02, step: Some(0.001) };
-        // 100 rays of a millisecond for 40: a step of four times leaves 38 and loses 0.5 %.
+        // 100 rays of 1 ms have 40 ms: a step of four times leaves 38 ms and loses 0.5 %.
         assert_eq!(losses.least(100.0, 1.0, 40.0), Lowered { stride: 1, step: 4.0 });
         assert_eq!(losses.least(100.0, 0.2, 30.0), Lowered { stride: 1, step: 1.0 });
-        // 2 % of every second pixel against 10 % and more of a longer step.
+        // Every second pixel loses 2 %, and a longer step 10 % and more.
         let rough = Losses { resolution: 0.02, step: Some(0.1) };
         assert_eq!(rough.least(100.0, 1.0, 40.0), Lowered { stride: 2, step: 1.0 });
         let stepless = Losses { resolution: 0.02, step: None };
         assert_eq!(stepless.least(200.0, 1.0, 30.0), Lowered { stride: 4, step: 1.0 });
-        // Nothing is in time: the cheapest that there is.
+        // No reduction is in time, so the cheapest one is taken.
         assert_eq!(losses.least(1e9, 1.0, 30.0), Lowered { stride: MOST_STRIDE, step: 4.0 });
     }
 
-    /// Motion that knows what the parts of a picture are worth.
+    /// A motion that knows its losses.
     fn motion(losses: Losses) -> Motion {
         Motion { losses: Some(losses), ..Motion::new() }
     }
@@ -232,17 +230,17 @@ mod tests {
 
     #[test]
     fn a_motion_is_smooth_where_little_is_lost_and_else_steady() {
-        // 30 ms of rays for 13 ms: a step of four times.
+        // 30 ms of rays have 13 ms: a step of four times is in time.
         let mut gentle = motion(Losses { resolution: 0.5, step: Some(0.01) });
         let (lowered, loss) = gentle.least(3e5, 1e-4, false);
         assert_eq!(lowered, Lowered { stride: 1, step: 4.0 });
         assert!((loss - 0.05).abs() < 1e-12);
         assert!(gentle.is_smooth);
-        // A step of twice would do for 20 ms, and lose 20 %: all of it, 30 times a second.
+        // A step of twice would bring 20 ms of rays in time, but lose 20 %. So the whole picture is rendered, 30 times per second.
         let mut rough = motion(Losses { resolution: 0.5, step: Some(0.2) });
         assert_eq!(rough.least(2e5, 1e-4, false), (Lowered::default(), 0.0));
         assert!(!rough.is_smooth);
-        // What is not known is not risked either.
+        // Unknown losses are not risked either.
         let mut unknown = Motion::new();
         assert_eq!(unknown.least(2e5, 1e-4, false).0, Lowered::default());
     }

@@ -1,4 +1,4 @@
-//! What a picture was after fewer samples: of a render the last that its halves are compared by, of a pilot all of them.
+//! The pictures after fewer samples. A render keeps the last one, to compare its halves, and a pilot keeps all.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -8,7 +8,7 @@ use super::layer::Layer;
 use crate::error::Result;
 use crate::film::{Halves, Round, pilot_rounds};
 
-/// Samples after which a render's picture is first kept: before, a moving camera has had its frames.
+/// The number of samples after which a render's picture is first kept. A moving camera has had its frames by then.
 const FIRST: u32 = 4;
 
 /// The rounds of a picture.
@@ -23,13 +23,13 @@ impl Rounds {
         Self { pilot, kept: Vec::new(), halves: None }
     }
 
-    /// Another camera or step.
+    /// Forgets the rounds, as for another camera or step.
     pub fn forget(&mut self) {
         self.kept.clear();
         self.halves = None;
     }
 
-    /// After a pass: keeps what the picture is after 4, 8, 16, … samples, and notes what it differs by from that of half as many.
+    /// Keeps the picture after 4, 8, 16, … samples, and notes its difference from the picture of half as many.
     pub fn passed(&mut self, context: &DeviceContext, layer: &Layer, device_time: Duration) -> Result<()> {
         let samples = layer.samples;
         let whole = samples.is_power_of_two();
@@ -55,12 +55,12 @@ impl Rounds {
         pilot_rounds().nth(self.kept.len()) == Some(samples)
     }
 
-    /// What the newest two differ by of which one has twice as many samples.
+    /// The difference of the two newest pictures of which one has twice as many samples.
     pub fn halves(&self) -> Option<Halves> {
         self.halves
     }
 
-    /// All that is kept, for a planner.
+    /// All pictures that a pilot has kept, for a planner.
     pub fn on_the_way(&self) -> Vec<Arc<Round>> {
         if self.pilot { self.kept.clone() } else { Vec::new() }
     }

@@ -1,19 +1,19 @@
-//! Where in its pixel each sample goes through.
+//! The place in its pixel that each sample's ray goes through.
 
 use std::f64::consts::{FRAC_PI_6, TAU};
 
 use glam::Vec2;
 
-/// Samples before the quarter turns.
+/// The number of samples before the quarter turns.
 const FIRST: u32 = 4;
 
-/// Where in its pixel sample `n` of a picture goes through, the same in all pixels: `sample_offset` of `kernels/shared/tile.h`.
+/// The place in its pixel that the ray of sample `n` goes through, the same in all pixels: `sample_offset` of `kernels/shared/tile.h`.
 ///
-/// What a mean of few samples misses of a smooth slope is the mean of their places, so that must be the pixel's centre: the first is the
-/// centre; with it, three around it at 120° from each other at a distance of √2/3 have the second moments of the whole pixel, so that four
-/// samples integrate every quadratic; from then on a point of the R2 sequence (Roberts, "The Unreasonable Effectiveness of Quasirandom
-/// Sequences", 2018) in a quarter of the pixel is followed by its mirror image and by both a quarter turned. After 1, 4, 6, 8, 10, …
-/// samples the mean is the centre. At edges and in slopes these are better than R2 alone, by 1.8 and 16 times after 16 samples.
+/// On a smooth slope, the mean of few samples has the error of the mean of their places, so that mean must be the pixel's centre. The first sample
+/// is the centre. Three around it, at 120° from each other and at a distance of √2/3, give the four together the second moments of the whole pixel,
+/// so that they integrate every quadratic. From then on, a point of the R2 sequence (Roberts, "The Unreasonable Effectiveness of Quasirandom
+/// Sequences", 2018) in a quarter of the pixel is followed by its mirror image and by both of them turned by a quarter. After 1, 4, 6, 8, 10, …
+/// samples the mean is the centre. After 16 samples, these places are better than R2 alone by 1.8 times at edges and 16 times in slopes.
 pub(super) fn sample_offset(n: u32) -> Vec2 {
     if n < FIRST {
         let radius = if n == 0 { 0.0 } else { 2.0f64.sqrt() / 3.0 };
@@ -58,7 +58,7 @@ mod tests {
 
     #[test]
     fn they_see_where_an_edge_is() {
-        // Coverage by a straight edge at 360 angles and 41 distances; a cell of 1/n by random places has a deviation of up to ½/√n.
+        // The coverage by a straight edge at 360 angles and 41 distances. With n random places, it has a deviation of up to ½/√n.
         let wrong = |samples: u32| {
             let mut squares = 0.0;
             for angle in 0..360 {

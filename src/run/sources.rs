@@ -1,4 +1,4 @@
-//! Every kernel of this program, and those that are compiled before somebody asks for them.
+//! All kernels of this program, and the variants that are compiled before somebody asks for them.
 
 use crate::device::program::{Source, Variant};
 use crate::device::{cells, encode, reduce};
@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::technique;
 use crate::volume::VoxelType;
 
-/// Every kernel that there is.
+/// All kernels.
 pub fn sources() -> impl Iterator<Item = Source> {
     technique::all().map(|t| (t.source)()).chain(cells::sources()).chain([encode::source(), reduce::source()])
 }
@@ -17,8 +17,8 @@ pub(super) fn source_of(variant: &Variant) -> Result<Source> {
     sources().find(|s| s.kernel == variant.kernel).ok_or_else(missing)
 }
 
-/// What the first picture needs, most likely: the first technique on words, which the floats of built-in volumes are taken as, and on
-/// bytes, and what films are encoded by.
+/// The variants that the first picture most likely needs: the first technique on words, as which the floats of built-in volumes are taken, and on
+/// bytes, and the encoder of films.
 pub(super) fn first() -> Vec<Variant> {
     let views = technique::ALL.first().map_or(Vec::new(), |t| ((t.source)().variants)());
     let of =
@@ -26,7 +26,7 @@ pub(super) fn first() -> Vec<Variant> {
     of(VoxelType::U16).chain(of(VoxelType::U8)).chain((encode::source().variants)()).collect()
 }
 
-/// What is compiled ahead, the likeliest first.
+/// The variants that are compiled ahead, the likeliest first.
 pub(super) fn common() -> Vec<Variant> {
     sources().flat_map(|s| (s.variants)().into_iter().take(s.common).collect::<Vec<_>>()).collect()
 }

@@ -1,4 +1,4 @@
-//! When a render stops: what comes after a pass.
+//! The decision after a pass: the render goes on, refines its step, or stops.
 
 use std::time::Instant;
 
@@ -8,18 +8,18 @@ use crate::error::Result;
 use crate::film::is_round;
 use crate::technique::Random;
 
-/// What comes after a pass.
+/// The decision after a pass.
 pub(super) enum Next {
     GoOn,
     /// Start over with half the step.
     Refine,
-    /// Stop, and why.
+    /// Stop, for this reason.
     Stop(&'static str),
 }
 
-/// Decides what comes after a pass. The error is looked at after 2, 3, 4, 6, 8, 12, … samples, a fixed order, so that the same
-/// request stops at the same sample. Where the step, not the noise, keeps the error above what was asked for, the step is
-/// halved; where nothing is left to halve, the render stops and says so.
+/// Decides after a pass. The error is read after 2, 3, 4, 6, 8, 12, … samples, a fixed order, so that the same request stops at the same sample. If
+/// the step, not the noise, keeps the error above the requested one, the step is halved. If it cannot be halved any more, the render stops and says
+/// so.
 pub(super) fn next(view: &mut ViewRun, started: Instant, context: &DeviceContext) -> Result<Next> {
     let (samples, budget) = (view.samples(), view.scene().budget());
     if samples >= budget.samples {

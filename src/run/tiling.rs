@@ -1,31 +1,31 @@
-//! Which tiles of a picture the next pass samples, and how often: all of them once, or, where a render is adaptive, those with the more
-//! error the more often.
+//! The tiles that the next pass samples, and the samples of each. Every tile is sampled once, or, if a render is adaptive, tiles with more error
+//! are sampled more often.
 //!
-//! With n_i samples of a tile whose samples have the deviation σ_i and cost c_i each, Σ σ_i² / n_i is least for a given Σ n_i c_i where
-//! n_i ∝ σ_i / √c_i (Neyman, JRSS 97, 1934). The cost is counted in steps of the kernel, not in time, which depends on the weather. The
-//! deviations are looked at after 16, 24, 32, 48, 64, … samples on average, and every pass is one sample on average, so that what is sampled
-//! depends on nothing but the samples. To choose by the samples themselves is biased: a tile that happens to look
-//! calm is looked at less often. A part of the mean deviation is added to each, which keeps the bias small.
+//! Let a tile have n_i samples of deviation σ_i and of cost c_i each. Then Σ σ_i² / n_i is least for a given Σ n_i c_i if n_i ∝ σ_i / √c_i (Neyman,
+//! JRSS 97, 1934). The cost is counted in steps of the kernel, not in time, which depends on the load. The deviations are read after 16, 24, 32,
+//! 48, 64, … samples on average, and every pass is one sample on average, so that the choice depends on nothing but the samples. A choice by the
+//! samples themselves is biased: a tile that happens to look calm is sampled less often. A part of the mean deviation is added to each deviation,
+//! which keeps the bias small.
 
 use crate::film::Tiles;
 use crate::technique::{Random, TILE, TILES_HEADER};
 
-/// The part of the mean deviation that every tile has at least.
+/// The part of the mean deviation that is added to every tile's.
 const FLOOR: f64 = 0.25;
-/// About how many samples a tile gets in a pass at most: its samples are taken one after the other, and a pass must not wait for long.
+/// The approximate number of samples that a tile gets in a pass at most. Its samples are taken one after the other, and a pass must not take long.
 const MOST: f64 = 16.0;
 
 /// The tiles of one layer.
 pub(super) struct Tiling {
     wide: usize,
-    /// Samples of each tile's pixels so far.
+    /// The samples of each tile's pixels so far.
     counts: Vec<u32>,
-    /// Samples that each tile gets in the round under way, and how many passes it has.
+    /// The samples of each tile in the round under way, and the number of its passes.
     round: Option<(Vec<u32>, u32)>,
     passes: u32,
-    /// What a sample of each costs, in steps, once that is known.
+    /// The cost of a sample of each tile, in steps, once it is known.
     costs: Option<Vec<f64>>,
-    /// Entries and samples of the pass under way.
+    /// The entries and the samples of the pass under way.
     size: (usize, usize),
 }
 
@@ -40,24 +40,24 @@ impl Tiling {
         (self.round, self.passes, self.costs) = (None, 0, None);
     }
 
-    /// True if an adaptive render should look at the deviations now.
+    /// True if an adaptive render should read the deviations now.
     pub fn is_due(&self, samples: u32) -> bool {
         let done = self.round.as_ref().is_none_or(|(_, passes)| self.passes == *passes);
         samples >= Random::LEAST_SAMPLES && done
     }
 
-    /// True if what a sample costs is yet to be learnt.
+    /// True if the cost of a sample is not known yet.
     pub fn wants_costs(&self) -> bool {
         self.costs.is_none()
     }
 
-    /// Learns what a sample costs from what all so far have.
+    /// Learns the cost of a sample from the cost of all samples so far.
     pub fn learn_costs(&mut self, costs: &[u32]) {
         let each = costs.iter().zip(&self.counts).map(|(c, n)| f64::from((*c).max(1)) / f64::from((*n).max(1)));
         self.costs = Some(each.collect());
     }
 
-    /// Plans the samples up to the next look, from the deviation of each tile's samples.
+    /// Plans the samples up to the next reading of the deviations, from the deviation of each tile's samples.
     pub fn plan(&mut self, samples: u32, deviations: &[f64]) {
         let passes = if samples.is_power_of_two() { samples / 2 } else { samples / 3 }.max(1);
         let tiles = self.counts.len() as f64;
@@ -80,8 +80,8 @@ impl Tiling {
         self.passes = 0;
     }
 
-    /// What the next pass samples, as `kernels/shared/tile.h` reads it: how many tiles, the number of their next sample, and whether a list
-    /// follows instead, for each the tile, the number of its next sample, and how many it gets.
+    /// The tiles of the next pass, as `kernels/shared/tile.h` reads them: the number of tiles, the number of their next sample, and 1 if a list
+    /// follows instead. An entry of the list is a tile, the number of its next sample, and its samples in the pass.
     pub fn pass(&mut self, samples: u32) -> Vec<u32> {
         if self.round.is_none() {
             self.size = (self.tiles(), self.tiles());
@@ -100,14 +100,14 @@ impl Tiling {
         list
     }
 
-    /// How often the next pass samples a tile: a round's samples are spread evenly over its passes.
+    /// The number of samples of a tile in the next pass. A round's samples are spread evenly over its passes.
     fn times(&self, tile: usize) -> u32 {
         let Some((samples, passes)) = &self.round else { return 1 };
         let upto = |pass: u32| u64::from(samples[tile]) * u64::from(pass) / u64::from(*passes);
         (upto(self.passes + 1) - upto(self.passes)) as u32
     }
 
-    /// A pass is over.
+    /// Notes that a pass is over.
     pub fn passed(&mut self) {
         let times: Vec<u32> = (0..self.counts.len()).map(|tile| self.times(tile)).collect();
         for (count, times) in self.counts.iter_mut().zip(times) {
@@ -116,29 +116,29 @@ impl Tiling {
         self.passes += 1;
     }
 
-    /// Samples by tile, where they differ.
+    /// The samples by tile, if the tiles differ.
     pub fn counts(&self) -> Option<Tiles> {
         self.round.as_ref().map(|_| Tiles { side: TILE, wide: self.wide, counts: self.counts.clone() })
     }
 
-    /// Work-items of the pass under way on so many lanes, and about how many pixels' samples each has.
+    /// The work-items of the pass under way on `lanes` lanes, and the approximate number of pixel samples of each.
     pub fn items(&self, lanes: usize) -> (usize, usize) {
         let (entries, samples) = self.size;
         let items = entries * if lanes > 1 { 1 } else { TILE * TILE };
         (items, (samples * TILE * TILE / items.max(1)).max(1))
     }
 
-    /// How many tiles there are.
+    /// The number of tiles.
     pub fn tiles(&self) -> usize {
         self.counts.len()
     }
 
-    /// Bytes of what the device is told and tells: an entry of every tile, and behind them what each has cost.
+    /// The bytes of the list with an entry for every tile, and of the cost of each tile behind it.
     pub fn room(&self) -> usize {
         self.costs_at() + 4 * self.tiles()
     }
 
-    /// Where the costs start, in bytes.
+    /// The offset of the costs, bytes.
     pub fn costs_at(&self) -> usize {
         4 * (TILES_HEADER + 3 * self.tiles())
     }
@@ -165,7 +165,7 @@ mod tests {
         let mut samples = 16;
         while samples < 768 {
             if tiling.is_due(samples) {
-                // Costs of 1, 1, 1 and 4 a sample.
+                // The costs of a sample are 1, 1, 1 and 4.
                 if tiling.wants_costs() {
                     tiling.learn_costs(&[16, 16, 16, 64]);
                 }
@@ -178,7 +178,7 @@ mod tests {
         }
         let counts = tiling.counts().unwrap_or_default().counts;
         assert_eq!(counts.iter().sum::<u32>(), 4 * 768, "{counts:?}");
-        // Deviations with a quarter of their mean added, over the roots of the costs: 0.8125, 1.8125, 2.8125, 5.40625 of 10.84375.
+        // The deviations with a quarter of their mean added, over the roots of the costs, are 0.8125, 1.8125, 2.8125, 5.40625 of 10.84375.
         for (count, part) in counts.iter().zip([0.0749, 0.1672, 0.2594, 0.4985]) {
             assert!((f64::from(*count) / 3072.0 - part).abs() < 0.002, "{counts:?}");
         }

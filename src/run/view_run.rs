@@ -1,8 +1,8 @@
 //! A view on the device: its buffers and the order of its passes.
 //!
-//! First the control: every eighth pixel, more of a small picture, at twice the step, which is also the first picture. The passes
-//! proper follow, and the control gets another sample each time their number has doubled, so that it always costs little and knows
-//! enough; where nothing but the step tells the two apart, it gets one for each.
+//! The control comes first: every eighth pixel, or more of a small picture, at twice the step. It is also the first picture. The main passes
+//! follow. The control gets another sample each time their number has doubled, so that it costs little and still tells the error. If the two differ
+//! by the step alone, the control gets a sample for each main pass.
 
 mod launch;
 mod passes;
@@ -30,7 +30,7 @@ use crate::technique::{PreparedView, Random, ViewPlan};
 
 /// The shortest step that `max_error` leads to, in voxels: the shortest that a request may ask for.
 const LEAST_STEP_VOXELS: f64 = 0.05;
-/// A picture is not shown before its first pass where that is likely to take less than this.
+/// A picture is not shown before its first pass if that is likely to take less than this, ms.
 const QUICK_MS: f64 = 50.0;
 
 /// A view at work.
@@ -39,25 +39,25 @@ pub(super) struct ViewRun {
     prepared: Arc<dyn PreparedView>,
     /// The box that it looks at, with its grid.
     bounds: Bounds,
-    /// The volume that it reads, where it reads one.
+    /// The volume that it reads, if it reads one.
     volume: Option<Rc<DeviceVolume>>,
-    /// Its plan, with the step as it is by now.
+    /// Its plan, with the present step.
     plan: ViewPlan,
-    /// What the kernel is told of the cells, where that is not their ranges.
+    /// The distances of the macro-cells, if the kernel does not read their ranges.
     distances: Option<Rc<Buffer>>,
     parameters: Buffer,
     view_buffer: Buffer,
-    /// The camera and image, and the same with the pass under way.
+    /// The camera and image, alone and with the pass under way.
     view: DeviceView,
     pass_view: DeviceView,
     pub gathered: Gathered,
-    /// What a ray of the step asked for takes, where it was last seen in motion, ms.
+    /// The time of a ray at the requested step, as last measured in motion, ms.
     ray_ms: Option<f64>,
     pass: Option<Pass>,
     cursor: usize,
-    /// What launches leave undone, where they are bounded in steps.
+    /// The work that launches leave undone, if they are bounded in steps.
     resume: Resume,
-    /// The launch that has left something undone: its work-items, and its time so far.
+    /// The launch that has left work undone: its work-items, and its time so far.
     undone: Option<(usize, Duration)>,
     slice_length: SliceLength,
     /// True if the first pass is likely to be over before a picture of the control could be seen.
@@ -69,12 +69,12 @@ pub(super) struct ViewRun {
     longest: f64,
     least_step: f32,
     random: Option<Random>,
-    /// Device time since the start.
+    /// The device time since the start.
     pub device_time: Duration,
 }
 
 impl ViewRun {
-    /// Begins a view whose kernels are built, in the memory of what was gathered `before`.
+    /// Begins a view whose kernels are built, in the memory of the samples `before`.
     pub fn new(
         context: &mut DeviceContext,
         scene: Scene,
@@ -132,7 +132,7 @@ impl ViewRun {
         })
     }
 
-    /// Another camera: everything gathered so far is of the old one.
+    /// Starts over with another camera, since all samples are of the old one.
     pub fn restart(&mut self, context: &mut DeviceContext, scene: &Scene) -> Result<()> {
         self.scene = scene.clone();
         self.view = device_view(scene, &*self.prepared, &self.bounds);
@@ -145,12 +145,12 @@ impl ViewRun {
         Ok(())
     }
 
-    /// Samples per pixel of the passes proper.
+    /// The samples per pixel of the main passes.
     pub fn samples(&self) -> u32 {
         self.gathered.samples()
     }
 
-    /// True if no pass is under way: all pixels have as many samples as it says.
+    /// True if no pass is under way, so that all pixels have the number of samples that it says.
     pub fn is_between_passes(&self) -> bool {
         self.pass.is_none()
     }
@@ -160,13 +160,13 @@ impl ViewRun {
         self.quick
     }
 
-    /// True if the step is still longer than what a request may ask for.
+    /// True if half the step is still one that a request may ask for.
     pub fn can_halve_step(&self) -> bool {
         self.plan.step >= 2.0 * self.least_step
     }
 
-    /// Starts over with half the step: what was gathered has the error of the longer one. The passes proper of the longer step
-    /// would make a good control, but for their number; a fresh one costs an eighth of a pass.
+    /// Starts over with half the step, since the samples have the error of the longer one. The main passes of the longer step would make a good
+    /// control but for their number. A fresh control costs at most an eighth of a pass.
     pub fn halve_step(&mut self, context: &DeviceContext) -> Result<()> {
         self.plan.step *= 0.5;
         self.gathered.moving = None;
@@ -194,12 +194,12 @@ impl ViewRun {
         self.random.is_some()
     }
 
-    /// What a reader should know of the volume and of the parameters on it.
+    /// The warnings about the volume and the parameters on it.
     pub fn warnings(&self) -> Vec<Value> {
         warnings(&self.scene, &*self.prepared, &self.bounds)
     }
 
-    /// The camera moves: where all of the picture would be late, the first frame has less of what loses the least.
+    /// Prepares for a moving camera. If the whole picture would be late, the first frame is reduced where that loses the least.
     pub fn hurry(&mut self, context: &DeviceContext, motion: &mut Motion) -> Result<()> {
         let rays = (self.gathered.size[0] * self.gathered.size[1]) as f64;
         let ray_ms = self.ray_ms.or_else(|| context.speed(&self.plan.variant).map(f64::recip));
@@ -216,13 +216,13 @@ impl ViewRun {
         Ok(())
     }
 
-    /// True if a picture is there that was made to be in time.
+    /// True if there is a picture that was reduced to be in time.
     pub fn has_hurried(&self) -> bool {
         self.gathered.moving.as_ref().is_some_and(|m| m.layer.samples > 0)
     }
 }
 
-/// What all passes of a view are told.
+/// The part of the device's view that all passes share.
 fn device_view(scene: &Scene, prepared: &dyn PreparedView, bounds: &Bounds) -> DeviceView {
     let mut view = scene.camera().device_view(scene.image(), scene.region().left_top, bounds);
     view.full_width = scene.image()[0] as i32;
@@ -233,7 +233,7 @@ fn device_view(scene: &Scene, prepared: &dyn PreparedView, bounds: &Bounds) -> D
     view
 }
 
-/// A view's table for a step, kept with the volume where it looks at one.
+/// A view's table for a step. The volume keeps it if there is one.
 fn table(
     device: &Device,
     volume: Option<&DeviceVolume>,
@@ -247,7 +247,7 @@ fn table(
     }
 }
 
-/// True if a sample of the control differs from the one of its number in the passes proper by its step alone.
+/// True if a sample of the control differs from the main sample of the same number by its step alone.
 fn is_paired(view: &DeviceView) -> bool {
     view.jittered == 0
 }

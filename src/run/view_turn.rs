@@ -1,4 +1,4 @@
-//! A turn of the view: a slice, and after a pass what comes of it: a frame, a shorter step, or the end.
+//! A turn of the view: a slice, and after a pass a frame, a shorter step, or the end.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -13,19 +13,19 @@ use super::view_run::ViewRun;
 use crate::error::Result;
 use crate::job::Snapshot;
 
-/// A turn on the device: long enough to be worth a launch, short enough that nobody waits and a cancel is felt at once.
+/// The slice of a view: long enough to be worth a launch, short enough that nobody waits and a cancel is felt at once.
 const SLICE: Duration = Duration::from_millis(20);
-/// A turn while the camera moves and its picture is there: the next camera does not wait for the rest of it,
+/// The slice while the camera moves and its picture is there. The next camera then does not wait for the rest of the picture.
 const MOVING_SLICE: Duration = Duration::from_millis(2);
-/// until none has come for so long.
+/// The time without a new camera after which the camera is at rest.
 const AT_REST: Duration = Duration::from_millis(100);
-/// Frames are not made faster than the eye sees: encoding takes cores that the device wants.
+/// The time between frames. The eye does not see faster ones, and encoding takes cores that the device needs.
 const FRAME_EVERY: Duration = Duration::from_millis(30);
-/// The same where nobody looks: for who asks how far it is.
+/// The time between frames if nobody looks. They serve those who ask for the progress.
 const UNSEEN_EVERY: Duration = Duration::from_millis(500);
 
 impl Live {
-    /// A slice of the view.
+    /// Takes a slice of the view.
     pub(super) fn view_turn(&mut self, context: &mut DeviceContext) -> Result<Turn> {
         if self.shown == Shown::Waits && self.job.take_encoder() {
             self.leave_snapshot(context, None)?;
@@ -37,7 +37,8 @@ impl Live {
         match view.slice(context, slice)? {
             None => Ok(Turn::Again),
             Some(Pass::Moving) => {
-                // It is not left out because the frame before is still being encoded: the next camera is not followed before this is seen.
+                // The picture is not left out while the frame before is still being encoded: the next camera is not followed before this one is
+                // seen.
                 self.shown = Shown::Waits;
                 Ok(Turn::Again)
             }
@@ -52,7 +53,7 @@ impl Live {
         camera.is_some_and(|camera| camera.asked.elapsed() < AT_REST) && self.shown != Shown::Nothing
     }
 
-    /// One picture of a field that is still filling; then the field goes on.
+    /// Makes one picture of a field that is still filling; then the field goes on.
     fn after_look(&mut self, context: &mut DeviceContext, pass: Pass) -> Result<Turn> {
         if pass == Pass::Main {
             self.compare_with_half(context)?;
@@ -88,7 +89,7 @@ impl Live {
         }
     }
 
-    /// Learns what a lower resolution and a longer step would lose, for when the camera moves.
+    /// Learns the losses of a lower resolution and of a longer step, for the time when the camera moves.
     fn learn_losses(&mut self, context: &DeviceContext) -> Result<()> {
         if let (Some(view), true) = (&mut self.view, self.job.is_followed()) {
             self.motion.see(&view.gathered.encode(context)?);
@@ -96,7 +97,7 @@ impl Live {
         Ok(())
     }
 
-    /// Leaves a frame where it is time for one and the encoder is free.
+    /// Leaves a frame if one is due and the encoder is free.
     fn frame_if_due(&mut self, context: &DeviceContext, pass: Pass) -> Result<Turn> {
         let followed = self.job.is_followed();
         let every = if followed { FRAME_EVERY } else { UNSEEN_EVERY };
@@ -110,8 +111,8 @@ impl Live {
         Ok(Turn::Again)
     }
 
-    /// The picture of a field against that of half as much work. Two pictures of one random sample differ by their own noise, whatever the
-    /// field's, and are not compared.
+    /// Compares the picture of a field with that of half as much work. Two pictures of one random sample differ by their own noise, whatever the
+    /// field's noise is, and are not compared.
     fn compare_with_half(&mut self, context: &DeviceContext) -> Result<()> {
         match (&mut self.field, &mut self.view) {
             (Some(field), Some(view)) if !view.is_random() => field.compare_with_half(view.gathered.film(context)?),

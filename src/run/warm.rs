@@ -1,4 +1,4 @@
-//! Building a kernel for real: PoCL compiles at the first launch, so each is launched once on nothing.
+//! The complete build of a kernel. PoCL compiles at the first launch, so each kernel is launched once on nothing.
 
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ pub(super) fn warm(device: &mut Device, variant: &Variant) -> Result<()> {
     }
     let source = source_of(variant)?;
     device.build(&source, variant)?;
-    // Zeroed buffers ask for an image of no pixels or a launch of no histories: compiled, and nothing done.
+    // Zeroed buffers ask for an image of no pixels or a launch of no histories, so that the kernel is compiled and does nothing.
     let zero = |parameter: &Parameter| -> Result<Buffer> {
         if parameter.is_volume && device.info().volumes_are_images {
             device.upload_image(&Voxels::U8(vec![0]), [1; 3])
@@ -30,7 +30,7 @@ pub(super) fn warm(device: &mut Device, variant: &Variant) -> Result<()> {
     let buffers: Vec<Buffer> = parameters.iter().map(zero).collect::<Result<_>>()?;
     let arguments: Vec<(&str, &Buffer)> = parameters.iter().map(|p| p.name.as_str()).zip(&buffers).collect();
     device.run(variant, &arguments, 1)?;
-    // A note beside what PoCL keeps; without it the variant is compiled again, which finds it there.
+    // The note stands beside PoCL's cache. Without it the variant is compiled again, which finds the cached one.
     if let Some(note) = note(device, variant) {
         drop(note.parent().map(std::fs::create_dir_all));
         drop(std::fs::write(note, variant.label()));
@@ -38,7 +38,7 @@ pub(super) fn warm(device: &mut Device, variant: &Variant) -> Result<()> {
     Ok(())
 }
 
-/// Where it is noted that PoCL's cache has a variant: in the cache's own folder, so that both go together.
+/// The file that notes that PoCL's cache has a variant. It is in the cache's own folder, so that both are deleted together.
 fn note(device: &Device, variant: &Variant) -> Option<PathBuf> {
     let cache = std::env::var_os("POCL_CACHE_DIR").filter(|_| device.info().is_pocl())?;
     let source = source_of(variant).ok()?;

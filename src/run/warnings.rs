@@ -1,4 +1,4 @@
-//! What a reader should know of a volume and of the parameters on it.
+//! The warnings about a volume and the parameters on it.
 
 use serde_json::{Value, json};
 
@@ -7,7 +7,7 @@ use crate::scene::bounds::Bounds;
 use crate::technique::PreparedView;
 use crate::volume::Volume;
 
-/// The warnings of what a scene looks at, which fills the box, in codes and words.
+/// The warnings about the subject of a scene, which fills the box, as codes and messages.
 pub(super) fn warnings(scene: &Scene, view: &dyn PreparedView, bounds: &Bounds) -> Vec<Value> {
     let mut warnings = view.volume().map_or(Vec::new(), |volume| of_volume(volume));
     if scene.clip().removes_all(bounds) {

@@ -133,6 +133,14 @@ impl Bench {
         self.handle.block_on(self.service.planner().settings(request))
     }
 
+    /// True if the view of a request takes random samples.
+    ///
+    /// # Errors
+    /// Those of the request.
+    pub fn is_random(&self, request: &Value) -> Result<bool> {
+        Ok(self.service.scene(request)?.view().random().is_some())
+    }
+
     /// Runs a request and reads numbers from it.
     ///
     /// # Errors

@@ -113,7 +113,7 @@ pub(super) fn least_ms(
         let error = known.error(&run)?;
         if error <= asked {
             // Between two numbers of samples the error of random paths is known; the error of evenly spread places jumps.
-            let random = run.noise_is_random;
+            let random = bench.is_random(setting)?;
             return Ok(Some(before.filter(|_| random).map_or((time, samples), |(fewer, worse, ms)| {
                 let [few, many] = [fewer as f64, samples as f64];
                 let power = (error / worse).ln() / (many / few).ln();

@@ -1,4 +1,4 @@
-//! The engine in this process, for tests that look at the film itself in linear floats.
+//! The engine in this process, for tests of the film itself in linear floats.
 
 use std::sync::{Arc, OnceLock};
 
@@ -21,7 +21,7 @@ struct Flags {
     limits: Limits,
 }
 
-/// The kernels that a scene's field runs, or else its view.
+/// The kernels of a scene's field, or else of its view.
 pub fn kernels_of(scene: &Scene) -> Vec<Variant> {
     match scene.subject().field() {
         Some(asked) => asked.field.kernels().unwrap(),
@@ -49,23 +49,23 @@ impl House {
         Self { service, runtime, _data: data }
     }
 
-    /// What is stored.
+    /// The stored assets.
     pub fn assets(&self) -> &Assets {
         self.service.assets()
     }
 
-    /// The scene of a request, or why it is refused.
+    /// The scene of a request, or the error by which it is refused.
     pub fn scene(&self, request: &Value) -> Result<Scene, Error> {
         self.service.scene(request)
     }
 
-    /// The shared one, with the device's own lanes.
+    /// The shared house, with the device's own number of lanes.
     pub fn shared() -> &'static Self {
         static HOUSE: OnceLock<House> = OnceLock::new();
         HOUSE.get_or_init(|| Self::on(DeviceConfig::pocl()))
     }
 
-    /// A shared one with so many lanes.
+    /// A shared house with `lanes` lanes.
     pub fn of_lanes(lanes: u32) -> &'static Self {
         static HOUSES: [OnceLock<House>; 5] = [const { OnceLock::new() }; 5];
         HOUSES[lanes.ilog2() as usize]
@@ -78,7 +78,7 @@ impl House {
         Bench::of(self.service.clone()).unwrap()
     }
 
-    /// What its device says of itself.
+    /// The description of its device.
     pub fn info(&self) -> Arc<DeviceInfo> {
         self.runtime.block_on(self.service.engine().ready()).unwrap()
     }
@@ -122,7 +122,7 @@ impl House {
         image::load_from_memory(&self.png(request)).unwrap().into_bytes()
     }
 
-    /// Puts a raw volume of floats in the store and returns what goes under `volume`.
+    /// Puts a raw volume of floats in the store and returns the request's value for `volume`.
     pub fn floats(&self, dims: [usize; 3], value: impl Fn(f64, f64, f64) -> f64) -> Value {
         let mut bytes = Vec::new();
         let centre = |i: usize, n: usize| (i as f64 + 0.5) / n as f64 * 2.0 - 1.0;
@@ -144,7 +144,7 @@ impl House {
         json!({"id": id})
     }
 
-    /// Puts a volume file in the store and returns what goes under `volume`.
+    /// Puts a volume file in the store and returns the request's value for `volume`.
     pub fn file(&self, bytes: Vec<u8>) -> Value {
         json!({"id": self.assets().volumes().insert(bytes, "file", None).unwrap().1})
     }

@@ -1,4 +1,4 @@
-//! Scenes that scatter light, and how their films are judged.
+//! Scenes that scatter light, and the tests of their films.
 
 use std::sync::Arc;
 
@@ -12,10 +12,10 @@ pub fn spot(from: [f64; 3], wide: f64) -> Value {
     spot_at(from, [0.0; 3], wide)
 }
 
-/// The same at a place.
+/// The same camera, with a spot at a place.
 pub fn spot_at(from: [f64; 3], target: [f64; 3], wide: f64) -> Value {
     let length = from.iter().map(|v| v * v).sum::<f64>().sqrt();
-    // As near as the narrowest camera permits.
+    // The camera is as near as the narrowest angle of view permits.
     let away = (570.0 * wide).min(50.0);
     assert!(away > 3.9, "a spot of {wide} is too small");
     let eye: Vec<f64> = (0..3).map(|i| target[i] + away * from[i] / length).collect();
@@ -39,7 +39,7 @@ fn luminance(p: &[f32]) -> f64 {
     0.2126 * f64::from(p[0]) + 0.7152 * f64::from(p[1]) + 0.0722 * f64::from(p[2])
 }
 
-/// The mean luminance over all pixels, and its standard error by the spread of the pixels: of pixels that all see the same.
+/// The mean luminance over all pixels, and its standard error by the spread of the pixels. All pixels must see the same.
 pub fn mean(film: &Film) -> (f64, f64) {
     mean_by(film, luminance)
 }
@@ -79,7 +79,7 @@ pub fn total(f: &Film) -> (f64, f64) {
     (sum, f.main.m2.iter().map(|m2| f64::from(*m2) / (n - 1.0) / n).sum())
 }
 
-/// z of every pixel's luminance between two films; of pixels without variance, 0 where they are the same.
+/// The z of every pixel's luminance between two films. It is 0 for pixels without variance that are the same.
 pub fn pixel_z(a: &Film, b: &Film) -> Vec<f64> {
     let variance = |f: &Film, i: usize| {
         let n = f64::from(f.main.count);
@@ -95,9 +95,9 @@ pub fn pixel_z(a: &Film, b: &Film) -> Vec<f64> {
         .collect()
 }
 
-/// Fails unless two films are of the same picture: no more pixels beyond the two-sided 1 % level, corrected for their number by Šidák, than
-/// one in 400, the same mean, and a mean of z² of no more than noise. (The mean of z itself is not 0: of skew samples those pixels that
-/// happen to be dark also happen to look certain.)
+/// Fails unless two films are of the same picture. No more pixels than one in 400 may be beyond the two-sided 1 % level, corrected for their number
+/// by Šidák, the means must be the same, and the mean of z² must be no more than noise. (The mean of z itself is not 0: if samples are skewed,
+/// pixels that happen to be dark also happen to look certain.)
 pub fn same_picture(a: &Film, b: &Film, what: &str) {
     let z = pixel_z(a, b);
     let n = z.len() as f64;
@@ -113,7 +113,7 @@ pub fn same_picture(a: &Film, b: &Film, what: &str) {
     assert!(square < 1.15, "{what}: the mean of z² is {square}");
 }
 
-/// The probability that noise is beyond ±z: Abramowitz & Stegun 7.1.26 is not good enough in the tail, so a continued fraction.
+/// The probability that noise is beyond ±z. Abramowitz & Stegun 7.1.26 is not good enough in the tail, so this is a continued fraction.
 fn two_sided(z: f64) -> f64 {
     if z < 2.0 {
         return 1.0;

@@ -1,4 +1,4 @@
-//! What the tests share: the real binary as a server on a free port, a client, and the real scans.
+//! The common part of the tests: the real binary as a server on a free port, a client, and the real scans.
 
 #![allow(dead_code, reason = "each test file uses its own part of this")]
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test says what is wrong by panicking")]
@@ -16,28 +16,28 @@ use std::process::{Child, Command, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// An object with more fields, or others in their place.
+/// An object with more fields, or with other values in their place.
 pub fn with(object: &serde_json::Value, more: &serde_json::Value) -> serde_json::Value {
     let mut all = object.clone();
     all.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
     all
 }
 
-/// A `cloudchamber serve` with a data folder of its own; stopped when dropped.
+/// A `cloudchamber serve` with a data folder of its own. It is stopped when dropped.
 pub struct Server {
     child: Child,
     url: String,
     pub data: tempfile::TempDir,
 }
 
-/// One cache of compiled kernels for all tests: they are the same for each.
+/// The cache of compiled kernels. All tests have one, since the kernels are the same for each.
 pub fn kernel_cache() -> PathBuf {
     std::env::var_os("POCL_CACHE_DIR")
         .map_or_else(|| PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("kernels"), PathBuf::from)
 }
 
-/// Held while a device of this process is opened: OpenCL's loader and PoCL begin their work then, which they do for one thread at a time.
-/// The first has PoCL keep what it compiles in the tests' cache; it changes the environment for that.
+/// The lock for opening a device of this process: OpenCL's loader and PoCL then start up, which they can do for one thread at a time. The first
+/// caller has PoCL keep its compiled kernels in the tests' cache, for which it changes the environment.
 pub fn opening() -> MutexGuard<'static, ()> {
     static KEPT: Mutex<bool> = Mutex::new(false);
     static OPENING: Mutex<()> = Mutex::new(());
@@ -49,7 +49,7 @@ pub fn opening() -> MutexGuard<'static, ()> {
     held
 }
 
-/// Says what a test that passes did not do: the macros that print would be silenced.
+/// Reports the parts that a passing test has skipped. The macros that print would be silenced.
 pub fn say(words: &str) {
     use std::io::Write;
     drop(writeln!(std::io::stderr(), "{words}"));
@@ -133,17 +133,17 @@ impl Server {
         let first = lines.next().unwrap().unwrap();
         let url = first.split_whitespace().last().unwrap().to_owned();
         assert!(url.starts_with("http://127.0.0.1:"), "the server said: {first}");
-        // Whatever else it prints must be read, or it would block.
+        // Everything else that it prints must be read, or it would block.
         std::thread::spawn(move || lines.map_while(Result::ok).for_each(|line| eprintln!("server: {line}")));
         Self { child, url, data }
     }
 
-    /// Its address, such as `http://127.0.0.1:40000`.
+    /// The address of the server, such as `http://127.0.0.1:40000`.
     pub fn url(&self) -> String {
         self.url.clone()
     }
 
-    /// `host:port`.
+    /// The address as `host:port`.
     pub fn address(&self) -> String {
         self.url.trim_start_matches("http://").to_owned()
     }
@@ -160,7 +160,7 @@ impl Server {
         self.child.id()
     }
 
-    /// Resident memory in bytes.
+    /// The resident memory in bytes.
     pub fn resident_bytes(&self) -> u64 {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.pid())).unwrap();
         let line = status.lines().find(|l| l.starts_with("VmRSS:")).unwrap();
@@ -192,7 +192,7 @@ pub fn mri_head() -> Vec<u8> {
     std::fs::read(&path).unwrap_or_else(|e| panic!("{path}: {e}; install mricron-data or set CLOUDCHAMBER_TEST_MRI"))
 }
 
-/// The CT head for trials, where it is.
+/// The CT head for trials, if it is there.
 pub fn ct_head() -> Option<Vec<u8>> {
     std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/CT_AVM.nii.gz")).ok()
 }

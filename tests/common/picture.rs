@@ -1,4 +1,4 @@
-//! A picture as a film and as a PNG file, and the bound that pictures of other numbers of lanes are held to.
+//! A picture as a film and as a PNG file, and the bound on the difference of pictures of other numbers of lanes.
 
 use std::fmt;
 
@@ -8,12 +8,12 @@ use exr::prelude::{ReadChannels, ReadLayers};
 #[derive(Clone)]
 pub struct Picture {
     pub size: [usize; 2],
-    /// Red, green, blue and alpha.
+    /// The red, green, blue and alpha of each pixel.
     pub values: Vec<[f32; 4]>,
     pub bytes: Vec<u8>,
 }
 
-/// How far apart pictures are: the greatest difference of a value and of a byte, and that of the means of a channel.
+/// The difference of two pictures: the greatest difference of a value, of a byte, and of the means of a channel.
 #[derive(Debug)]
 pub struct Difference {
     pub value: f32,
@@ -41,15 +41,15 @@ impl Picture {
         Self { size, values: image.layer_data.channel_data.pixels.1, bytes }
     }
 
-    /// Whether two of its pixels differ.
+    /// True if two of its pixels differ.
     pub fn shows_something(&self) -> bool {
         self.bytes.chunks(4).any(|pixel| pixel != &self.bytes[..4])
     }
 
-    /// How far it is from the `reference`.
+    /// The difference from the `reference`.
     ///
     /// # Errors
-    /// What makes them another picture at all: a size, or a value that is a number in one of them only.
+    /// The reason that makes them other pictures altogether: a size, or a value that is a number in one of them only.
     pub fn difference(&self, reference: &Self) -> Result<Difference, String> {
         let [ours, theirs] = [self, reference].map(|p| (p.size, p.values.len(), p.bytes.len()));
         if ours != theirs {
@@ -67,7 +67,7 @@ impl Picture {
         })
     }
 
-    /// Tells how it is another picture than the `reference`, if it is.
+    /// The difference from the `reference` in words, if it is another picture.
     pub fn other_than(&self, reference: &Self) -> Option<String> {
         match self.difference(reference) {
             Ok(d) if d.value < 1.0 / 255.0 && d.byte <= 1 && d.mean < 1e-4 => None,
@@ -77,7 +77,7 @@ impl Picture {
     }
 }
 
-/// What the comparison itself must see; a test runs it.
+/// A test of the comparison itself: it must see these differences.
 pub fn check_comparison() {
     let picture = Picture { size: [2, 2], values: vec![[0.5; 4]; 4], bytes: vec![188; 16] };
     let changed = |change: &dyn Fn(&mut Picture)| {

@@ -1,7 +1,7 @@
 //! The list of requests in `tests/requests/*.json`, and the volumes that it calls `{"test": NAME}`.
 //!
-//! Every entry has a name of its own. Most are render requests. The others have `calls`: what is sent to a server, one after the other.
-//! `./dev compare` sends all of them to two servers, and tests render those that end in a picture.
+//! Every entry has a name of its own. Most are render requests. The others have `calls`, which are sent to a server, one after the other. `./dev
+//! compare` sends all of them to two servers, and tests render those that end in a picture.
 
 use std::path::Path;
 
@@ -13,13 +13,13 @@ use super::engine::House;
 
 /// The files whose requests do not all end in a picture.
 const NO_PICTURES: [&str; 4] = ["calls", "errors", "exports", "plans"];
-/// What an entry says of itself beside its request.
+/// The fields of an entry beside its request.
 const ABOUT: [&str; 5] = ["name", "reference", "compare", "changed", "few_steps"];
 
-/// One of the list.
+/// An entry of the list.
 pub struct Asked {
     pub name: String,
-    /// `reference`, `compare`, `changed` and `few_steps`, where it has them.
+    /// `reference`, `compare`, `changed` and `few_steps`, if it has them.
     pub about: Value,
     pub request: Value,
 }
@@ -34,24 +34,24 @@ impl Asked {
         Self { name, about, request }
     }
 
-    /// The technique that it is there for: the one of its field, where it has one.
+    /// The technique that it tests: the one of its field, if it has one.
     pub fn technique(&self) -> &str {
         let field = technique::fields().find(|t| self.request["volume"].get(t.name).is_some());
         field.map_or_else(|| self.request["technique"].as_str().unwrap(), |t| t.name)
     }
 
-    /// Tells if it needs a volume that only a [`House`] has.
+    /// True if it needs a volume that only a [`House`] has.
     pub fn needs_house(&self) -> bool {
         self.request.to_string().contains(r#""test":"#)
     }
 
-    /// Tells if a film of it is committed.
+    /// True if a film of it is committed.
     pub fn is_reference(&self) -> bool {
         self.about["reference"] == true
     }
 }
 
-/// The request with a size and a budget. One that is no good stays as it is.
+/// The request with a size and a budget. An invalid request stays as it is.
 pub fn small(mut request: Value) -> Value {
     if let Some(own) = request.as_object_mut() {
         own.entry("budget").or_insert(json!({"samples": 2}));
@@ -100,7 +100,7 @@ pub const VOLUMES: [&str; 18] = [
     "long", "needles", "plate", "flat", "falling",
 ];
 
-/// What is uploaded as a test volume: bytes, and what says how to read them, where they do not say so themselves.
+/// The upload of a test volume: its bytes, and the way to read them, if they do not tell it themselves.
 pub fn upload(name: &str) -> (Vec<u8>, RawQuery) {
     let dims @ [wide, high, deep] = if name == "plate" { [24, 20, 1] } else { [24, 20, 22] };
     let places = (0..wide * high * deep).map(|i| [i % wide, i / wide % high, i / (wide * high)]);
@@ -157,7 +157,7 @@ fn nifti(dims: [usize; 3], voxels: impl Iterator<Item = u8>) -> Vec<u8> {
 /// The request with ids in place of test volumes, wherever they stand in it.
 pub fn with_ids(request: &Value, id: &dyn Fn(&str) -> String) -> Value {
     match request {
-        // Beside other fields, such as a level, too.
+        // A test volume may have other fields beside it, such as a level.
         Value::Object(fields) => fields
             .iter()
             .map(|(k, v)| match (k.as_str(), v) {

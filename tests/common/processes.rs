@@ -1,11 +1,11 @@
-//! Parts of a test in processes of their own: PoCL compiles one kernel at a time in each, and a machine has more cores.
+//! Parts of a test in processes of their own. PoCL compiles one kernel at a time in each process, and a machine has more cores.
 
 use std::process::{Command, Stdio};
 
 const PART: &str = "CLOUDCHAMBER_TEST_PART";
 
-/// The environment in which this program's OpenCL is oclgrind, which logs to `log`. It exits 0 with errors in its log, and without the dylib's
-/// path PoCL would run in its place.
+/// The environment in which this program's OpenCL is oclgrind, which logs to `log`. oclgrind exits with 0 even if its log has errors, and without
+/// the dylib's path PoCL would run in its place.
 pub fn oclgrind_environment(log: &std::path::Path) -> Vec<(&'static str, std::ffi::OsString)> {
     vec![
         ("OPENCL_DYLIB_PATH", "/usr/lib/oclgrind/liboclgrind-rt.so".into()),
@@ -16,7 +16,7 @@ pub fn oclgrind_environment(log: &std::path::Path) -> Vec<(&'static str, std::ff
     ]
 }
 
-/// Does `work`, which is the test of this name, in a process under oclgrind, and returns its log.
+/// Does `work`, which is the test with this name, in a process under oclgrind, and returns its log.
 pub fn under_oclgrind(test: &str, work: impl FnOnce()) -> String {
     const INNER: &str = "CLOUDCHAMBER_TEST_OCLGRIND";
     if std::env::var_os(INNER).is_some() {
@@ -33,7 +33,7 @@ pub fn under_oclgrind(test: &str, work: impl FnOnce()) -> String {
     std::fs::read_to_string(log).unwrap_or_default()
 }
 
-/// Does `work` for every part of the test of this name, all at once.
+/// Does `work` for every part of the test with this name, all at once.
 pub fn in_processes(test: &str, parts: &[&str], work: impl FnOnce(&str)) {
     if let Ok(part) = std::env::var(PART) {
         return work(&part);

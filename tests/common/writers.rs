@@ -47,7 +47,7 @@ pub fn encode(raw: RawType, big: bool, value: f64) -> Vec<u8> {
     }
 }
 
-/// What is left of a value that went through the type.
+/// The value after a conversion to the type and back.
 pub fn through(raw: RawType, value: f64) -> f32 {
     match raw {
         RawType::U8 => f32::from(value as u8),
@@ -118,7 +118,7 @@ impl Nifti {
         rows.iter().flatten().enumerate().for_each(|(i, &value)| self.put_f32(280 + 4 * i, value));
     }
 
-    /// Quaternion b, c, d, offset x, y, z.
+    /// Sets the quaternion b, c, d and the offset x, y, z.
     pub fn put_qform(&mut self, values: [f32; 6], qfac: f32) {
         self.put_i16(252, 1);
         self.put_f32(76, qfac);

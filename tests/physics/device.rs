@@ -1,5 +1,5 @@
-//! The device: structs lie as on the host, every variant builds without a warning, a tiny case of each kernel runs clean under oclgrind,
-//! and kernels are launched as they are asked for.
+//! The device: structs have the host's layout, every variant builds without a warning, a tiny case of each kernel runs clean under oclgrind, and
+//! kernels are launched as they are asked for.
 
 pub(crate) mod builds;
 mod cells;

@@ -1,4 +1,4 @@
-//! `histogram` against counts in double precision, a closed form, and what is counted apart.
+//! `histogram` against counts in double precision, a closed form, and the values that are counted apart.
 
 use cloudchamber::job::State;
 use cloudchamber::volume::RawQuery;
@@ -38,7 +38,7 @@ fn words(dims: [usize; 3], value: impl Fn(usize) -> i16) -> Value {
 
 #[test]
 fn each_value_is_in_its_bin_and_no_other() {
-    // 0 to 99, each value as often as the last two digits of 31 i are it; bins of one value, with the values in their middles.
+    // The values are 0 to 99, each as often as it is the last two digits of 31 i. Bins have one value each, in their middles.
     let value = |i: usize| (i * 31 % 100) as i16;
     let dims = [20, 30, 41];
     let (rows, result) = of(&words(dims, value), json!({"bins": 100, "range": [-0.5, 99.5]}));
@@ -58,7 +58,7 @@ fn each_value_is_in_its_bin_and_no_other() {
 fn what_is_outside_and_what_is_no_number_is_counted_apart() {
     let house = House::shared();
     let volume = house.floats([10, 10, 10], |x, y, _| if x > 0.0 && y > 0.0 { f64::NAN } else { x });
-    // x is −0.9, −0.7 … 0.9: of the 750 finite voxels 500 are below 0.
+    // x is −0.9, −0.7 … 0.9. Of the 750 finite voxels 500 are below 0.
     let (rows, result) = of(&volume, json!({"bins": 2, "range": [-0.4, 0.0]}));
     let voxels: Vec<f64> = rows.iter().map(|row| row[2]).collect();
     assert_eq!(voxels, [100.0, 100.0], "−0.3 and −0.1");
@@ -72,7 +72,7 @@ fn what_is_outside_and_what_is_no_number_is_counted_apart() {
 
 #[test]
 fn a_gaussians_levels_are_spheres() {
-    // exp(−r²/2s²) is at least v within r = s √(−2 ln v): the part of the box that is inside, to a voxel's surface.
+    // exp(−r²/2s²) is at least v within r = s √(−2 ln v). The count is the part of the box inside, to a voxel's surface.
     let house = House::shared();
     let s = 0.3;
     let volume = house.floats([96; 3], |x, y, z| (-(x * x + y * y + z * z) / (2.0 * s * s)).exp());
@@ -87,7 +87,7 @@ fn a_gaussians_levels_are_spheres() {
 
 #[test]
 fn values_that_fall_as_voxels_rise_are_in_the_bins_of_their_values() {
-    // The scale of a NIfTI file: 100 − 2 · voxel.
+    // The scale of the NIfTI file is 100 − 2 · voxel.
     let house = House::shared();
     let (bytes, query) = crate::common::pictures::upload("falling");
     let (volume, id, _) = house.assets().volumes().insert(bytes, "falling", query.parse().unwrap()).unwrap();

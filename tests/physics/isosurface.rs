@@ -1,4 +1,4 @@
-//! `isosurface` against a double-precision host reference of where rays cross, closed forms of light and layers, and what is asked.
+//! `isosurface` against a double-precision host reference of the crossings, closed forms of light and layers, and its requests.
 
 mod agreement;
 mod asked;

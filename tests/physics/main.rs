@@ -1,6 +1,6 @@
 //! Techniques, the device and the study in this process: truth first, then distributions, then small pictures.
 //!
-//! One program, so that its tests share one engine ([`common::engine::House::shared`]) and what that has compiled.
+//! They are one program, so that its tests share one engine ([`common::engine::House::shared`]) and its compiled kernels.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test says what is wrong by panicking")]
 

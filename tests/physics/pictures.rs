@@ -1,8 +1,8 @@
-//! A tenth of the list of requests against films that were committed: what is drawn stays the same at every level of processors.
+//! A tenth of the list of requests against committed films: the pictures stay the same at every level of processors.
 //!
-//! Bytes differ between levels, so films are held to the bound that levels are held to (`tests/common/picture.rs`). Two builds on one machine
-//! are compared to the byte by `./dev compare`. `CLOUDCHAMBER_BLESS=1` writes the films anew, and `CLOUDCHAMBER_KERNELS=FOLDER` takes the
-//! kernels from a folder, such as those of an earlier commit.
+//! Bytes differ between levels, so films are held to the bound for levels (`tests/common/picture.rs`). `./dev compare` compares two builds on one
+//! machine to the byte. `CLOUDCHAMBER_BLESS=1` writes the films anew, and `CLOUDCHAMBER_KERNELS=FOLDER` takes the kernels from a folder, such as
+//! those of an earlier commit.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -16,12 +16,12 @@ use cloudchamber::technique::{self, Technique};
 use serde_json::{Value, json};
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/pictures");
-/// The size of a film, so that all of them take little room.
+/// The size of a film, so that all films together take little room.
 const SIZE: [usize; 2] = [16, 12];
-/// They take at most so many bytes.
+/// The greatest number of bytes of all films together.
 const ROOM: u64 = 300_000;
 
-/// The techniques that a picture is of.
+/// The techniques that make a picture, as views or as fields.
 fn of_pictures() -> impl Iterator<Item = &'static Technique> {
     technique::views().chain(technique::fields())
 }
@@ -37,7 +37,7 @@ fn references() -> Vec<Asked> {
     list
 }
 
-/// Where the film and the picture of a request are kept.
+/// The files of the film and the picture of a request.
 fn files(name: &str) -> [PathBuf; 2] {
     ["exr", "png"].map(|extension| Path::new(FOLDER).join(name).with_extension(extension))
 }
@@ -58,7 +58,7 @@ fn committed(name: &str) -> Result<Picture, String> {
     Ok(Picture::read(&exr?, &png?))
 }
 
-/// Work that no launch finishes at once comes to the same as if one did.
+/// Work that takes many launches gives the same result as work in one launch.
 #[test]
 fn launches_of_a_few_steps_make_the_same_pictures() {
     let cut = House::on(DeviceConfig { first_steps: 64, ..DeviceConfig::pocl() });
@@ -70,7 +70,7 @@ fn launches_of_a_few_steps_make_the_same_pictures() {
         let (whole, cut) = (film(House::shared()), film(&cut));
         assert!(whole.main.mean == cut.main.mean && whole.main.m2 == cut.main.m2, "{name}: another picture");
     }
-    // Every technique whose kernel leaves something to the next launch.
+    // Every technique whose kernel leaves work to the next launch is in the list.
     let resumes = |t: &&Technique| ((t.source)().words)().contains("_STATE_WORDS");
     assert_eq!(techniques, of_pictures().filter(resumes).map(|t| t.name).collect());
 }
@@ -138,7 +138,7 @@ fn all_techniques_voxel_types_and_features_are_in_the_list() {
     }
 }
 
-/// Parts of a request that may stand in several places are one: what they have in common starts with these.
+/// The place of a part of a request. Parts that may stand in several places have one place, which starts with the name that they share.
 fn place(at: &str) -> String {
     let at = at.replace("/photon_transport/labels", "/photon_transport/density");
     let shared = ["/phase", "/attenuation", "/single_scatter/lights", "/volume_path/lights", "/lights"];
@@ -147,7 +147,7 @@ fn place(at: &str) -> String {
     found.map_or(at.clone(), |start| at[start..].replace("/single_scatter", "").replace("/volume_path", ""))
 }
 
-/// Every field that a schema permits, and every word that one of them may be.
+/// Every field that a schema permits, and every word that a field may be.
 fn permitted(schema: &Value, at: &str, found: &mut BTreeSet<(String, String)>) {
     for (name, field) in schema["properties"].as_object().into_iter().flatten() {
         let at = place(&format!("{at}/{name}"));
@@ -160,7 +160,7 @@ fn permitted(schema: &Value, at: &str, found: &mut BTreeSet<(String, String)>) {
     found.extend(words.filter_map(Value::as_str).map(|word| (at.to_owned(), word.to_owned())));
 }
 
-/// Every field that a request has, and every word that one of them is.
+/// Every field of a request, and every word that a field is.
 fn used(request: &Value, at: &str, found: &mut BTreeSet<(String, String)>) {
     match request {
         Value::Object(fields) => {

@@ -4,7 +4,7 @@ use crate::common::engine::House;
 use crate::common::light::{agree, agrees, film, mean, scene, spot_at};
 use serde_json::{Value, json};
 
-/// Single scattering of a point light at `at` in the cube [-1, 1]³ of extinction `sigma`, along z through (x, y), by the midpoint rule.
+/// The single scattering of a point light at `at` in the cube [-1, 1]³ of extinction `sigma`, along z through (x, y), by the midpoint rule.
 fn airlight(sigma: f64, albedo: f64, g: f64, at: [f64; 3], [x, y]: [f64; 2]) -> f64 {
     let n = 100_000;
     let mut sum = 0.0;
@@ -12,7 +12,7 @@ fn airlight(sigma: f64, albedo: f64, g: f64, at: [f64; 3], [x, y]: [f64; 2]) -> 
         let z = 1.0 - 2.0 * (f64::from(i) + 0.5) / f64::from(n); // from the eye, which looks along -z
         let to = [at[0] - x, at[1] - y, at[2] - z];
         let r = (to[0] * to[0] + to[1] * to[1] + to[2] * to[2]).sqrt();
-        // Light that came along -to is scattered towards +z: the turn's cosine is that between -to and +z.
+        // Light that came along -to is scattered towards +z. The cosine of the turn is that between -to and +z.
         let mu = -to[2] / r;
         let phase = (1.0 - g * g) / (1.0 + g * g - 2.0 * g * mu).powf(1.5) / (4.0 * std::f64::consts::PI);
         sum += sigma * albedo * phase * (-sigma * (1.0 - z) - sigma * r).exp() / (r * r);
@@ -65,7 +65,7 @@ fn choosing_places_by_angle_changes_the_noise_and_no_mean() {
         (mean(&film), film.error().noise.unwrap())
     };
     agree(run(true, 1).0, run(false, 2).0, "equiangular");
-    // Places near the light are rare without it, and bright: one picture's noise says little.
+    // Without equiangular sampling, places near the light are rare and bright, and the noise of one picture says little.
     let noise = |equiangular: bool| (10..18).map(|seed| run(equiangular, seed).1.powi(2)).sum::<f64>().sqrt();
     let (quiet, loud) = (noise(true), noise(false));
     assert!(quiet < 0.5 * loud, "noise {quiet} with it, {loud} without");
@@ -73,7 +73,7 @@ fn choosing_places_by_angle_changes_the_noise_and_no_mean() {
 
 #[test]
 fn a_shadow_falls_where_the_sun_does_not_reach() {
-    // A dense slab over an empty half: what is under it is dark.
+    // A dense slab is over an empty half, and the part under it is dark.
     let volume = House::shared().floats([16, 16, 16], |_, y, _| {
         if y > 0.5 {
             200.0
@@ -94,7 +94,7 @@ fn a_shadow_falls_where_the_sun_does_not_reach() {
 
 #[test]
 fn a_lamp_far_away_is_a_sun() {
-    // Ten million lengths away: nothing of it is lost in the angles under which the ray is seen.
+    // The light is ten million lengths away. The angles under which the ray is seen must lose nothing of it.
     let smoke = json!({"builtin": "smoke", "resolution": 32});
     let run = |lights: Value, seed: u64| {
         let own = json!({"medium": {"sigma_t_per_unit": 6, "albedo": 0.8}, "lights": lights});

@@ -1,4 +1,4 @@
-//! `slice` against linear fields, slabs in closed form, and what is refused.
+//! `slice` against linear fields, slabs in closed form, and refused requests.
 
 mod asked;
 mod planes;

@@ -31,7 +31,7 @@ fn every_method_that_leaves_its_domain_says_so() {
             assert!(silent.is_empty(), "{} is wrong and silent:\n{}", outcome.name, silent.join("\n"));
             assert!(outcome.surprises.is_empty(), "{}: {:?}", outcome.name, outcome.surprises);
         }
-        // An experiment that no longer reaches where a method fails shows nothing.
+        // An experiment that no longer reaches the failure of its method shows nothing.
         for name in ["march_step", "majorant", "opacity_step", "single_scattering"] {
             let outcome = found.experiments.iter().find(|o| o.name == name).unwrap();
             assert_eq!(outcome.verdict, Verdict::BiasedAndFlagged, "{name}");

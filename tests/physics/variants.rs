@@ -1,5 +1,5 @@
-//! Every kernel variant that may be built is what some request asks for, and runs: for each of them a picture of a few pixels, which
-//! is the same whatever the type of the voxels.
+//! Every permitted kernel variant is needed by some request, and runs. For each variant there is a picture of a few pixels, which is the same
+//! whatever the type of the voxels.
 
 use std::collections::BTreeSet;
 
@@ -34,7 +34,7 @@ fn volumes(house: &House, value: impl Fn(usize) -> u8) -> Vec<String> {
     ]
 }
 
-/// The mean luminance of a picture of a few pixels, after the label of the variant that it is made by is noted.
+/// The mean luminance of a picture of a few pixels. The label of its variant is noted.
 fn look(house: &House, request: &Value, reached: &mut BTreeSet<String>) -> f64 {
     let scene = house.scene(request).unwrap_or_else(|e| panic!("{request}: {e}"));
     reached.extend(kernels_of(&scene).iter().map(|variant| variant.label()));
@@ -54,8 +54,8 @@ fn without_type(label: &str) -> String {
     label.split(' ').filter(|word| !is_type(word)).collect::<Vec<_>>().join(" ")
 }
 
-/// The places in [`volumes`] of the types of voxels that a technique's case runs on: the first on all, the others on one in turn and on the
-/// last, which it is compared with. `--full` runs all on all.
+/// The places in [`volumes`] of the types of voxels on which a technique's case runs: the first case on all types, the others on one in turn and on
+/// the last, with which it is compared. `--full` runs all on all.
 fn types(case: usize) -> Vec<usize> {
     if case == 0 || is_full() { vec![0, 1, 2, 3] } else { vec![case % 3, 3] }
 }
@@ -95,7 +95,7 @@ fn reach(house: &House, techniques: &[&Technique]) {
     }
     let listed = techniques.iter().flat_map(|t| ((t.source)().variants)());
     let all: BTreeSet<String> = listed.map(|v| v.label()).collect();
-    // Every variant, or one of each combination of features.
+    // The comparison is of every variant, or of one for each combination of features.
     let features = |label: &String| if is_full() { label.clone() } else { without_type(label) };
     let [listed, run]: [BTreeSet<String>; 2] = [&all, &reached].map(|labels| labels.iter().map(features).collect());
     let missed: Vec<_> = listed.difference(&run).collect();
@@ -107,7 +107,7 @@ fn reach(house: &House, techniques: &[&Technique]) {
 fn every_variant_is_what_some_request_runs() {
     in_processes("variants::every_variant_is_what_some_request_runs", &["0", "1"], |part| {
         let house = House::shared();
-        // As many variants in each, about.
+        // Each of the two parts has about as many variants.
         let mut by_size: Vec<&Technique> = technique::ALL.iter().collect();
         by_size.sort_by_key(|t| std::cmp::Reverse(((t.source)().variants)().len()));
         let mut parts = [(0, Vec::new()), (0, Vec::new())];

@@ -1,4 +1,4 @@
-//! Pictures of the same thing from elsewhere, on other grids and between the voxels.
+//! Pictures of the same subject from elsewhere, on other grids and between the voxels.
 
 mod interpolations;
 mod places;

@@ -1,4 +1,4 @@
-//! Volumes: read, built, measured and kept; and what hostile files do to the reader, which is nothing.
+//! Volumes: read, built, measured and kept; and hostile files, which do nothing to the reader.
 
 mod builtins;
 mod formats;

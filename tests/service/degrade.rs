@@ -1,4 +1,4 @@
-//! What a server does where not all is well with the device: fewer lanes, a kernel that does not build, none at all.
+//! A server with a faulty device: fewer lanes, a kernel that does not build, or no device at all.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -33,7 +33,7 @@ fn get(url: &str) -> (u16, Value) {
     })
 }
 
-/// Status and body of a render that is waited for: a PNG's size, or the problem.
+/// The status and body of an awaited render: a PNG's size, or the problem.
 fn render(server: &Server, request: &Value) -> (u16, Value) {
     let post = reqwest::Client::new().post(format!("{}/v1/renders", server.url())).header("Accept", "image/png");
     runtime().block_on(async {
@@ -56,7 +56,7 @@ fn fewer_lanes_are_tried_where_the_first_kernels_do_not_build() {
     assert_eq!((status, &device["lanes"]), (200, &json!(4)), "{device}");
     let (_, ready) = get(&format!("{}/readyz", server.url()));
     assert_eq!((&ready["lanes"], &ready["level"]), (&device["lanes"], &device["level"]));
-    // A device that likes four lanes at most has nothing to give up.
+    // A device that prefers four lanes at most has nothing to give up.
     let wide = device["native_vector_width_float"].as_u64().unwrap() > 4;
     let gave_up = ready["gave_up"].as_array().unwrap();
     assert_eq!(!gave_up.is_empty(), wide, "{ready}");
@@ -71,11 +71,11 @@ fn a_kernel_that_does_not_build_takes_only_itself_out() {
     let (status, problem) = render(&server, &picture(true));
     assert_eq!(status, 501, "{problem}");
     let words = problem["detail"].as_str().unwrap();
-    // Its floats are taken as words.
+    // The volume's floats are taken as words.
     assert!(words.contains("emission_absorption u16") && words.contains("SHADED=1"), "{words}");
     assert_eq!(problem["type"], "/problems/kernel-not-available");
     assert_eq!(render(&server, &picture(false)).0, 200);
-    // As a resource it says the same.
+    // The resource has the same message.
     let url = format!("{}/v1/renders", server.url());
     let made = runtime().block_on(async {
         let post = reqwest::Client::new().post(&url).json(&picture(true));
@@ -101,7 +101,7 @@ fn a_render_waits_for_its_kernel_and_says_so() {
     let waiting = wait_for(&url, |r| !r["waits_for"].is_null() || r["state"] == "done");
     assert_eq!(waiting["state"], "queued", "{waiting}");
     assert!(waiting["waits_for"]["kernel"].as_str().unwrap().starts_with("single_scatter f32"), "{waiting}");
-    // Meanwhile others are served.
+    // Other requests are served meanwhile.
     assert_eq!(render(&server, &picture(false)).0, 200);
     let done = wait_for(&url, |r| r["state"] == "done");
     assert_eq!((&done["waits_for"], &done["samples"]), (&Value::Null, &json!(1)));
@@ -118,7 +118,7 @@ fn without_a_device_the_problem_says_what_to_do() {
     }
 }
 
-/// A document once it is as wanted.
+/// A document, once it satisfies `wanted`.
 fn wait_for(url: &str, wanted: impl Fn(&Value) -> bool) -> Value {
     let started = Instant::now();
     loop {

@@ -1,4 +1,4 @@
-//! Broken and hostile input: each is told what is wrong in a problem document, and the service lives on.
+//! Broken and hostile input: each gets a problem document with its fault, and the service goes on.
 
 mod bodies;
 mod cameras;

@@ -1,4 +1,4 @@
-//! The house's own rules: layers, file sizes, and a README that works as written.
+//! The rules of the source tree: layers, file sizes, and a README that works as written.
 
 mod imports;
 
@@ -50,7 +50,7 @@ fn opencl_and_unsafe_live_in_device_only() {
     assert!(!mentioning(&["opencl3"]).is_empty(), "the test looks for something that is there");
 }
 
-/// The way of the data, the left first: a module uses only those behind it. Modules in brackets do not use each other.
+/// The layers, in the order of the data: a module uses only modules of later layers. Modules of one layer do not use each other.
 const ORDER: [&[&str]; 18] = [
     &["command"],
     &["http"],
@@ -211,9 +211,9 @@ fn the_readmes_curl_examples_work_as_written() {
     let mri =
         std::env::var("CLOUDCHAMBER_TEST_MRI").unwrap_or_else(|_| "/usr/share/mricron/templates/ch2.nii.gz".into());
     std::fs::copy(&mri, folder.path().join("ch2.nii.gz")).unwrap();
-    // A newcomer has patience; a test has two minutes a call.
+    // A newcomer has patience, but a test has two minutes per call.
     std::fs::write(folder.path().join(".curlrc"), "max-time = 120\n").unwrap();
-    // One shell for all: an example may use what one before it has set. `CC` is the address that the README sets itself.
+    // All examples run in one shell, since an example may use variables of an earlier one. `CC` is the address that the README sets itself.
     let script = format!("set -eu\n{}", examples.join("\n"));
     let output = Command::new("bash")
         .args(["-c", &script])

@@ -1,4 +1,4 @@
-//! What the tests of the service share: a client, the resource's life, problem documents, multipart parts and pixels.
+//! The common part of the tests of the service: a client, the resource's life, problem documents, multipart parts and pixels.
 
 #![allow(dead_code, reason = "each test file uses its own part of this")]
 
@@ -13,11 +13,11 @@ use serde_json::{Value, json};
 
 use crate::common::Server;
 
-/// How long anything here may take before it counts as never.
+/// The time after which anything here counts as never.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
-/// The server that the tests of one file share. It ends with the last test that holds it: a static would never be
-/// dropped and its process would outlive the tests.
+/// The server that the tests of one file share. It ends with the last test that holds it. A static would never be dropped, and its process would
+/// outlive the tests.
 pub fn shared() -> Arc<Server> {
     static SHARED: Mutex<Weak<Server>> = Mutex::new(Weak::new());
     let mut slot = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
@@ -132,7 +132,7 @@ pub fn endless() -> Value {
     })
 }
 
-/// `value` with the field at `pointer` set; objects on the way are made.
+/// `value` with the field at `pointer` set. Missing objects on the way are made.
 pub fn with(mut value: Value, pointer: &str, field: Value) -> Value {
     let at = pointer.split('/').skip(1).fold(&mut value, |at, name| &mut at[name]);
     *at = field;
@@ -147,7 +147,7 @@ pub async fn problem(response: Response, status: u16, about: &str) -> Value {
     check_problem(status, headers.get("content-type").map_or("none", |v| v.to_str().unwrap()), &text, about)
 }
 
-/// The same for an answer that came over a bare socket.
+/// Checks an answer that came over a bare socket.
 pub fn check_problem(status: u16, content_type: &str, body: &str, about: &str) -> Value {
     assert_eq!(content_type, "application/problem+json", "{about}: {body}");
     let problem: Value = serde_json::from_str(body).unwrap_or_else(|e| panic!("{about}: {e} in {body}"));
@@ -158,7 +158,7 @@ pub fn check_problem(status: u16, content_type: &str, body: &str, about: &str) -
     problem
 }
 
-/// Checks that a 422 names `pointer` and says what is permitted there.
+/// Checks that a 422 names `pointer` and the permitted values there.
 pub fn names(problem: &Value, pointer: &str, about: &str) {
     let errors = problem["errors"].as_array().unwrap();
     let found = errors.iter().find(|e| e["pointer"] == pointer);
@@ -168,7 +168,7 @@ pub fn names(problem: &Value, pointer: &str, about: &str) {
     }
 }
 
-/// Width, height and 8-bit RGB of a PNG.
+/// The width, height and 8-bit RGB of a PNG.
 pub fn pixels(png: &[u8]) -> (u32, u32, Vec<u8>) {
     let mut reader = png::Decoder::new(Cursor::new(png)).read_info().unwrap();
     let mut rgb = vec![0; reader.output_buffer_size().unwrap()];
@@ -177,12 +177,12 @@ pub fn pixels(png: &[u8]) -> (u32, u32, Vec<u8>) {
     (info.width, info.height, rgb)
 }
 
-/// How many different colours a PNG has.
+/// The number of different colours in a PNG.
 pub fn colours(png: &[u8]) -> usize {
     pixels(png).2.chunks_exact(3).collect::<std::collections::HashSet<_>>().len()
 }
 
-/// What a PNG of ours says of itself.
+/// The description in one of our PNGs.
 pub fn description(png: &[u8]) -> Value {
     serde_json::from_str(&cloudchamber::frame::read_description(png).unwrap()).unwrap()
 }
@@ -215,7 +215,7 @@ impl Part {
     }
 }
 
-/// Takes the whole parts off the front of `bytes`, and says whether the closing boundary came.
+/// Takes the whole parts off the front of `bytes`. Returns them, and true if the closing boundary came.
 pub fn take_parts(bytes: &mut Vec<u8>) -> (Vec<Part>, bool) {
     let mut parts = Vec::new();
     let find = |from: &[u8], what: &[u8]| from.windows(what.len()).position(|w| w == what);
@@ -242,7 +242,7 @@ pub fn take_parts(bytes: &mut Vec<u8>) -> (Vec<Part>, bool) {
     }
 }
 
-/// Reads a multipart answer to its end: the parts, and whether it was closed by its boundary.
+/// Reads a multipart answer to its end. Returns the parts, and true if its boundary closed it.
 pub async fn all_parts(response: Response) -> (Vec<Part>, bool) {
     assert_eq!(response.status(), 200);
     assert_eq!(response.headers()["content-type"], "multipart/x-mixed-replace; boundary=frame");
@@ -264,12 +264,12 @@ pub fn events(text: &str) -> Vec<Event> {
         .collect()
 }
 
-/// Sends bytes over a bare socket and returns the status, the content type and the body of the answer. `half_closed`
-/// ends the sending side, as a client that breaks off does.
+/// Sends bytes over a bare socket and returns the status, the content type and the body of the answer. `half_closed` ends the sending side, as a
+/// client that breaks off does.
 pub fn raw(server: &Server, request: &[u8], half_closed: bool) -> (u16, String, String) {
     let mut socket = TcpStream::connect(server.address()).unwrap();
     socket.set_read_timeout(Some(PATIENCE)).unwrap();
-    // The server may answer and close before it has read all of it.
+    // The server may answer and close before it has read all bytes.
     drop(socket.write_all(request));
     if half_closed {
         socket.shutdown(std::net::Shutdown::Write).unwrap();

@@ -1,7 +1,7 @@
 //! The viewer as its users meet it: a real Chromium, driven by chromedriver, against the real server.
 //!
-//! One browser at a time, for the sake of small machines. `./dev test` installs `chromium` and `chromedriver`; without
-//! them these tests fail and say so.
+//! One browser runs at a time, for the sake of small machines. `./dev test` installs `chromium` and `chromedriver`; without them these tests fail
+//! and say so.
 
 mod browser;
 
@@ -212,7 +212,7 @@ async fn the_charts_page_shows_what_was_measured() {
     page.close().await;
 }
 
-/// With the box ticked the planner chooses, and the page says what and why; without, nothing is planned.
+/// With the box ticked, the planner chooses, and the page shows its choice and its reasons. Without, nothing is planned.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_ticked_box_leaves_the_settings_to_the_planner() {
     let page = Page::open(DESKTOP).await;
@@ -221,7 +221,7 @@ async fn a_ticked_box_leaves_the_settings_to_the_planner() {
     page.until("a plan", "document.querySelector('#plan').textContent.includes('on the device')").await;
     page.settled().await;
     assert!(page.text("#plan").await.contains("sample"), "{}", page.text("#plan").await);
-    // A sample or two know little of their error: the plan's pilots measured it.
+    // A sample or two tell little of their error, which the plan's pilots have measured.
     assert!(page.text("#error").await.contains("by the plan"), "{}", page.text("#error").await);
     page.after("a frame after +", page.press(&['+'])).await;
     page.settled().await;

@@ -1,4 +1,4 @@
-//! One launch of a view's kernel: how many work-items, whether they are bounded in steps, and their arguments.
+//! One launch of a view's kernel: its work-items, its bound in steps, and its arguments.
 
 use std::time::Duration;
 
@@ -7,10 +7,10 @@ use crate::device::Device;
 use crate::error::Result;
 use crate::run::gathered::Pass;
 
-/// A beam has as many packets at most: rays of so many times fewer steps than a work-item may take are not bounded.
+/// The greatest number of packets of a beam. Rays of so many times fewer steps than a work-item may take are not bounded.
 const PACKETS: u32 = 4;
 impl ViewRun {
-    /// Work-items of a launch for about `slice`.
+    /// The work-items of a launch for about `slice`.
     pub(super) fn items(&self, device: &Device, slice: Duration, rays: usize) -> usize {
         let items = self.slice_length.items(device.info(), slice, rays);
         if self.is_bounded(device) { items.min(self.resume.most_items(device)) } else { items }
@@ -22,7 +22,7 @@ impl ViewRun {
         self.plan.state_words > 0 && (self.is_random() || steps > most)
     }
 
-    /// Runs `items` work-items of the pass, from the cursor on, or goes on with what the last launch of them has left.
+    /// Runs `items` work-items of the pass, from the cursor on, or continues the work that their last launch has left.
     pub(super) fn launch(
         &mut self,
         device: &Device,

@@ -1,4 +1,4 @@
-//! The passes of a view: which is next, and a slice of it.
+//! The passes of a view: the choice of the next one, and a slice of it.
 
 use std::time::Duration;
 
@@ -9,11 +9,11 @@ use crate::run::context::DeviceContext;
 use crate::run::gathered::Pass;
 use crate::run::sample_offsets::sample_offset;
 
-/// A pass in shorter slices does not tell how fast its kernel is: each waits for its longest rays.
+/// The shortest slice that tells the speed of a kernel. Shorter slices each wait for their longest rays.
 const TELLING_SLICE: Duration = Duration::from_millis(10);
 
 impl ViewRun {
-    /// Works for about `slice` and says which pass it finished, if one.
+    /// Works for about `slice` and returns the pass that it finished, if any.
     pub fn slice(&mut self, context: &mut DeviceContext, slice: Duration) -> Result<Option<Pass>> {
         let pass = match self.pass {
             Some(pass) => pass,
@@ -50,7 +50,7 @@ impl ViewRun {
         }
         self.gathered.layer_mut(pass).passed();
         (self.pass, self.cursor) = (None, 0);
-        // Samples that were put where the error is have no halves.
+        // Adaptive samples have no halves, since they are placed by the error.
         if pass == Pass::Main && !self.random.is_some_and(|r| r.adaptive) {
             self.gathered.keep_round(context, self.device_time)?;
         }
@@ -64,7 +64,7 @@ impl ViewRun {
         let adaptive = pass == Pass::Main && self.random.is_some_and(|r| r.adaptive);
         self.gathered.layer_mut(pass).choose_tiles(context, adaptive)?;
         if pass == Pass::Main && self.samples() == 0 {
-            // What is counted is of the picture, not of its preview.
+            // The counts are of the picture, not of its preview.
             context.device.write(&mut self.gathered.counts, 0, &[0; 32])?;
         }
         let layer = self.gathered.layer(pass);

@@ -10,11 +10,11 @@ use super::open;
 use crate::common::processes::in_processes;
 use crate::levels::is_full;
 
-/// Every number of lanes.
+/// All numbers of lanes.
 const LANES: [u32; 4] = [1, 4, 8, 16];
 
-/// The variants that are built for so many lanes: each combination of features with one type of voxels, another for each number of lanes,
-/// so that every variant is built for one. `--full` builds all for all.
+/// The variants that are built for a number of lanes: each combination of features with one type of voxels, and another type for each number of
+/// lanes, so that every variant is built once. `--full` builds all for all.
 fn built(variants: &[Variant], lanes: u32) -> Vec<Variant> {
     if is_full() {
         return variants.to_vec();

@@ -1,4 +1,4 @@
-//! Macro-cells as the device builds them, against brute force.
+//! Macro-cells of the device against brute force.
 
 use cloudchamber::device::Device;
 use cloudchamber::device::cells::{CELL, Cells};

@@ -11,7 +11,7 @@ fn number(i: usize, seed: usize) -> f32 {
     ((i + seed * 1_000_003).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as f32 / (1u32 << 24) as f32
 }
 
-/// A film, a third of it empty, some of its pixels opaque, some too bright, and some of unknown error.
+/// A film of which a third is empty, some pixels are opaque, some too bright, and some of unknown error.
 fn film([width, height]: [usize; 2], count: u32, tiled: bool, stride: usize, unit: f32) -> Samples {
     let pixels = width * height;
     let colour = |i: usize| {
@@ -38,7 +38,7 @@ fn count_at(samples: &Samples, i: usize) -> f64 {
     f64::from(count)
 }
 
-/// As they are defined; of the film alone.
+/// The sums by their definitions, of the film alone.
 fn plain(film: &Samples, threshold: f64, lanes: usize) -> Sums {
     let mut sums = Sums { block_count: (film.width / 2) * (film.height / 2), ..Sums::default() };
     for i in 0..film.pixels() {
@@ -65,7 +65,7 @@ fn plain(film: &Samples, threshold: f64, lanes: usize) -> Sums {
             sums.blocks += four.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / 4.0;
         }
     }
-    // All but the last of a packet, or of 32 pixels one by one, have a neighbour at hand.
+    // All pixels but the last of a packet, or of 32 pixels one by one, have a neighbour at hand.
     let part = if lanes == 1 { 32 } else { lanes };
     for i in 0..film.pixels() {
         let x = i % film.width;
@@ -95,7 +95,7 @@ fn srgb(v: f64) -> f64 {
     255.0 * if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// The picture's values before they are rounded to bytes, and how many are above white.
+/// The picture's values before they are rounded to bytes, and the number of those above white.
 fn plain_picture(film: &Samples, size: [usize; 2], background: Background) -> (Vec<f64>, u64) {
     let (mut values, mut clipped) = (Vec::new(), 0);
     let place = |full: usize, n: usize| {
@@ -133,7 +133,7 @@ fn numbers(s: &Sums) -> Vec<f64> {
     own.into_iter().chain(counts).chain([apart.squared, apart.variance]).collect()
 }
 
-/// Develops a film and compares all that comes of it.
+/// Develops a film and compares all results.
 fn check(device: &mut Device, film: &Samples, control: Option<&Samples>, background: Background) {
     let size = [film.width * film.stride, film.height * film.stride];
     let curve = curve(device).unwrap();
@@ -151,11 +151,11 @@ fn check(device: &mut Device, film: &Samples, control: Option<&Samples>, backgro
     for (i, (ours, plain)) in numbers(&sums).into_iter().zip(numbers(&expected)).enumerate() {
         assert!((ours - plain).abs() <= 2e-6 * plain.abs(), "{said}, sum {i}: {ours:e}, {plain:e}");
     }
-    // A value that is white to the last digit may be either.
+    // A value that is white to the last digit may be counted or not.
     assert!(sums.clipped.abs_diff(clipped) <= 1 + clipped / 10_000, "{said}: {} clipped, {clipped}", sums.clipped);
     assert_eq!(picture.len(), values.len(), "{said}");
     let furthest = picture.iter().zip(&values).map(|(b, v)| (f64::from(*b) - v).abs()).fold(0.0, f64::max);
-    // Half a step of the bytes, and of the table's where the curve is steepest: 12.92 · 255 / 65535 / 2.
+    // The bound is half a step of the bytes, and of the table's where the curve is steepest: 12.92 · 255 / 65535 / 2.
     assert!(furthest <= 0.5 + 0.026, "{said}: {furthest}");
 }
 
@@ -181,7 +181,7 @@ fn films_are_developed_as_they_are_defined() {
 #[test]
 fn small_squares_are_not_lost_below_the_least_float() {
     let mut device = super::open(None, None);
-    // Luminances of 1e-19 have squares that floats have no place for, and fourth powers that doubles just have.
+    // Luminances of 1e-19 have squares that floats cannot hold, and fourth powers that doubles just can.
     let dark = film([64, 48], 4, false, 1, 1e-19);
     let control = film([8, 6], 1, false, 8, 2e-19);
     let dark = Samples { m2: dark.mean.chunks(4).map(|p| 1e-36 * (1.0 + p[0])).collect(), ..dark };

@@ -5,7 +5,7 @@ use cloudchamber::device::program::{Source, Variant};
 
 use super::open;
 
-/// A file of two kernel functions, and how they are asked for.
+/// A file of two kernel functions, as a source.
 fn two_functions() -> (tempfile::TempDir, Source) {
     let folder = tempfile::tempdir().unwrap();
     let text = "kernel void fill(global int *out, constant int *size) {\n\
@@ -35,7 +35,7 @@ fn functions_of_a_file_run_over_ranges_of_one_to_three_dimensions() {
         // Whole work-groups write past their count.
         let (out, to) = (device.allocate(4 * (count + 64)).unwrap(), device.allocate(4 * (count + 64)).unwrap());
         let size_buffer = device.upload(bytemuck::cast_slice(&size), 0).unwrap();
-        // In any order.
+        // The arguments may come in any order.
         device.run(&fill, &[("size", &size_buffer), ("out", &out)], range).unwrap();
         device.run(&twice, &[("to", &to), ("from", &out)], count).unwrap();
         let mut found = vec![0i32; count];

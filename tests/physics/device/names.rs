@@ -1,4 +1,4 @@
-//! A name means one thing in all kernels, and every name in a condition is known: the preprocessor would take another for 0.
+//! A name means one thing in all kernels, and every name in a condition is known: the preprocessor would take an unknown one for 0.
 
 use std::collections::HashMap;
 
@@ -9,7 +9,7 @@ fn sources() -> Vec<Source> {
     run::sources().collect()
 }
 
-/// The names that a text defines, with what they stand for.
+/// The names that a text defines, with their definitions.
 fn defined(text: &str) -> Vec<(String, String)> {
     let definition = |line: &str| {
         let rest = line.trim_start().strip_prefix("#define ")?;

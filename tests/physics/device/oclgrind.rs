@@ -8,8 +8,8 @@ use serde_json::Value;
 
 use crate::common::processes::oclgrind_environment;
 
-/// Runs a scene on oclgrind and returns what it logged. It exits 0 with errors in its log, and without the dylib's path the
-/// run would silently happen on PoCL.
+/// Runs a scene on oclgrind and returns its log. oclgrind exits with 0 even if its log has errors, and without the dylib's path the run would
+/// silently happen on PoCL.
 fn oclgrind(scene: &Value, lanes: &str, kernels: Option<&Path>) -> String {
     let folder = tempfile::tempdir().unwrap();
     let (file, log) = (folder.path().join("scene.json"), folder.path().join("log"));
@@ -47,7 +47,7 @@ fn oclgrind_would_see_a_stray_store() {
         let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("kernels").join(name);
         std::fs::create_dir_all(folder.path().join(name).parent().unwrap()).unwrap();
         let text = std::fs::read_to_string(from).unwrap();
-        // A pixel too far.
+        // The kernel then writes a pixel too far.
         let broken = text.replace("film[4 * pixels + pixel] = m2;", "film[9 * pixels + pixel] = m2;");
         std::fs::write(folder.path().join(name), broken).unwrap();
     };

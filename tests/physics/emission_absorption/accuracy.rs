@@ -1,4 +1,4 @@
-//! Whether a picture says truly how wrong it is.
+//! The film's own error estimate against its real error.
 
 use serde_json::{Value, json};
 
@@ -25,8 +25,8 @@ fn the_stated_error_is_the_real_one() {
             let (film, error) = house.film(&request);
             let real = truth.difference(&film).unwrap();
             let ratio = error.total / real;
-            // Never much too small. It may be too large: the discretisation is a bound that holds for a first-order method, a
-            // multiple of the truth where the method does better; and the pixel offsets are better than random.
+            // The estimate is never much too small. It may be too large: the discretisation is a bound for a first-order method, which is a
+            // multiple of the truth if the method does better; and the pixel offsets are better than random ones.
             let most = if step > 1.0 { 8.0 } else { 4.0 };
             assert!(
                 (0.7..most).contains(&ratio),
@@ -45,7 +45,7 @@ fn noise_falls_at_least_with_the_square_root_of_the_samples_and_is_what_it_is_sa
     let [few, many] = [16, 256].map(|samples| {
         let (film, error) = house.film(&request(&volume, samples, 1.0, 3));
         let (noise, wrong) = (error.noise.unwrap(), film.difference(&truth).unwrap());
-        // The halves of evenly spread places differ by more than their mean is wrong. The truth has a noise of its own.
+        // The halves of evenly spread places differ by more than the error of their mean. The truth has a noise of its own.
         assert!(wrong <= 1.1 * noise && noise <= 4.0 * wrong, "{samples} samples: {wrong}, said to be {noise}");
         noise
     });

@@ -88,7 +88,8 @@ fn bytes(dims: [usize; 3]) -> Vec<u8> {
 
 #[test]
 fn grids_about_as_small_as_what_lanes_read_together_are_the_same_for_one_lane() {
-    // Lanes that are close together read blocks of 4³ voxels, lit ones of 6³: from there on, and below, nothing is read beyond the grid.
+    // Lanes that are close together read blocks of 4³ voxels, and lit ones blocks of 6³. From that size on, and below it, nothing is read beyond
+    // the grid.
     let (reference, plain) = (House::shared(), House::of_lanes(1));
     for dims in
         [[3, 3, 3], [4, 4, 4], [5, 4, 6], [5, 5, 5], [6, 6, 6], [7, 6, 9], [4, 16, 16], [16, 5, 16], [16, 16, 6]]

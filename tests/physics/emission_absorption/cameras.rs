@@ -61,7 +61,7 @@ fn exactly_along_each_axis() {
 
 #[test]
 fn a_million_units_away() {
-    // The box fills the picture, seen through a very long lens: all digits of a ray's place come from the plane near it.
+    // The box fills the picture, seen through a very long lens. All digits of a ray's place come from the plane near the box.
     for eye in [[0.0, 0.0, 1e6], [6e5, 5e5, -7e5]] {
         let fov_y_deg = 2.0 * (1.8 / DVec3::from(eye).length()).atan().to_degrees();
         if fov_y_deg >= 0.1 {
@@ -69,7 +69,7 @@ fn a_million_units_away() {
         }
     }
     check(&Eye::at([0.0, 0.0, 2000.0], 0.1), 2e-3);
-    // With a plain lens it is too small to see: right is nearly empty, and never garbage.
+    // With a plain lens the box is too small to see: a nearly empty picture is right, and it must have no garbage.
     let alpha = render(json!({"eye": [1e6, 0, 0], "fov_y_deg": 50}));
     assert!(alpha.iter().sum::<f32>() <= 1.0, "{}", alpha.iter().sum::<f32>());
 }
@@ -82,7 +82,7 @@ fn looking_away_is_empty() {
 
 #[test]
 fn orthographic_rays_are_parallel() {
-    // The target is 3 away and the half angle's tangent a half, so the picture is 3 units high: the box is 2/3 of it.
+    // The target is 3 away and the half angle's tangent is a half, so the picture is 3 units high, and the box is 2/3 of it.
     let camera = json!({"eye": [0, 0, 3], "target": [0, 0, 0], "up": [0, 1, 0], "fov_y_deg": 53.130102, "projection": "orthographic"});
     let truth = 1.0 - (-1.6f64).exp();
     for (pixel, alpha) in render(camera).into_iter().enumerate() {

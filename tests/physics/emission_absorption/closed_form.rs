@@ -8,7 +8,7 @@ use crate::common::engine::House;
 
 const SIDE: usize = 48;
 
-/// A box of one value, everywhere of opacity `sigma` per unit and white.
+/// A box of one value, everywhere white with an opacity of `sigma` per unit.
 fn constant_box(eye: &Eye, sigma: f64, step_voxels: f64) -> Value {
     json!({
         "technique": "emission_absorption", "volume": {"builtin": "constant", "resolution": 32}, "camera": eye.json(),
@@ -29,7 +29,7 @@ fn beer_lambert_through_a_box_at_any_angle() {
                 let d = eye.direction(pixel % SIDE, pixel / SIDE, SIDE);
                 let length = inside(eye.eye, d, DVec3::ONE).map_or(0.0, |(near, far)| far - near);
                 let truth = -(-sigma * length).exp_m1();
-                // At the silhouette, where the ray grazes an edge, its length has few digits in single precision.
+                // At the silhouette, the ray grazes an edge, and its length has few digits in single precision.
                 if length > 0.05 {
                     worst = worst.max((f64::from(p[3]) - truth).abs() / truth);
                 } else if length == 0.0 {
@@ -61,7 +61,7 @@ fn opacity_does_not_depend_on_the_step() {
 
 #[test]
 fn colours_and_opacities_follow_the_host_reference() {
-    // A volume without any symmetry, so that a swapped axis or a half-voxel shift shows.
+    // The volume has no symmetry at all, so that a swapped axis or a half-voxel shift shows.
     let n = 24;
     let value =
         |x: f64, y: f64, z: f64| 0.5 + 0.2 * (2.0 * x + 0.3).sin() + 0.2 * (1.5 * y - z).cos() * (x + 0.7 * z).sin();
@@ -86,8 +86,8 @@ fn colours_and_opacities_follow_the_host_reference() {
     let (film, _) = house.film(&request);
     let voxels = |x: usize, y: usize, z: usize| value(centre(x), centre(y), centre(z));
     let field = |p: DVec3| trilinear(&voxels, n, p);
-    // One sample starts anywhere in its first step of 1/240 unit: that much of the front's light may be missed or doubled in a
-    // pixel, and none of it on the average.
+    // A single sample starts anywhere in its first step of 1/240 unit. In a pixel that much of the front's light may be missed or doubled, and on
+    // average none of it.
     let (mut signed, mut compared) = ([0.0; 4], 0.0);
     for pixel in (0..SIDE * SIDE).step_by(7) {
         let d = eye.direction(pixel % SIDE, pixel / SIDE, SIDE);
@@ -107,7 +107,7 @@ fn colours_and_opacities_follow_the_host_reference() {
 
 #[test]
 fn a_slope_is_as_bright_as_lambert_says() {
-    // Values rise along x: the gradient is everywhere (1, 0, 0), and the box is opaque.
+    // Values rise along x, so the gradient is (1, 0, 0) everywhere, and the box is opaque.
     let house = House::shared();
     let volume = house.floats([32, 32, 32], |x, _, _| x);
     for (light, cosine) in [

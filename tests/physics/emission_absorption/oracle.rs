@@ -1,4 +1,4 @@
-//! What a ray should see, in double precision and written anew from the definitions: the camera, the box, the samples.
+//! The truth of a ray in double precision, written anew from the definitions: the camera, the box, the samples.
 
 use glam::{DVec3, dvec3};
 use serde_json::{Value, json};
@@ -34,7 +34,7 @@ impl Eye {
     }
 }
 
-/// Where a ray from the eye is inside the box of half size `half`, as distances from the eye.
+/// The part of a ray inside the box of half size `half`, as distances from the eye.
 pub fn inside(eye: DVec3, direction: DVec3, half: DVec3) -> Option<(f64, f64)> {
     let (mut near, mut far) = (0.0f64, f64::INFINITY);
     for axis in 0..3 {

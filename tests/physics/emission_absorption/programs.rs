@@ -1,4 +1,4 @@
-//! A program has no part that its features do without.
+//! A program has only the parts that its features need.
 
 use cloudchamber::technique::emission_absorption::TECHNIQUE;
 

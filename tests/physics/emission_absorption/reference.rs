@@ -1,5 +1,5 @@
-//! The fast form against the plain reference form (one lane, back to front, every sample, every ray to its end), and how fast
-//! errors fall with the step.
+//! The fast form against the plain reference form (one lane, back to front, every sample, every ray to its end), and the order of the errors in the
+//! step.
 
 use serde_json::{Value, json};
 
@@ -66,10 +66,10 @@ fn skipping_ending_and_lanes_change_no_pixel_by_a_grey_level() {
     assert!(lit > 30, "only {lit} of 50 show anything");
 }
 
-/// Root mean square over the pixels of the difference to a step 64 times shorter, for steps of 8, 4, 2 and 1 voxels.
+/// The root mean square over the pixels of the difference from a step 64 times shorter, for steps of 8, 4, 2 and 1 voxels.
 fn errors(parameters: &Value) -> Vec<f64> {
     let house = House::shared();
-    // Neither value nor slope is 0 at the box's faces, so that a method's order is that of the method.
+    // Neither value nor slope is 0 at the box's faces, so that the order is the method's own.
     let wave = |x: f64, y: f64, z: f64| 1.5 + (2.0 * x + 0.4).sin() * (1.7 * y).cos() + 0.6 * (2.3 * z + 0.2).sin();
     let volume = house.floats([64, 64, 64], wave);
     let film = |step_voxels: f64| {
@@ -80,7 +80,7 @@ fn errors(parameters: &Value) -> Vec<f64> {
         house.film(&json!({"technique": "emission_absorption", "volume": volume, "image": {"width": 32, "height": 32}, "budget": {"samples": 1},
             "camera": {"eye": [0.4, 0.3, 3], "up": [0, 1, 0], "fov_y_deg": 20}, "emission_absorption": own})).0
     };
-    // The reference by the second-order form, which at this step is far below all of them.
+    // The truth is of the second-order form, whose error at this step is far below all of them.
     let truth = house.film(&json!({"technique": "emission_absorption", "volume": volume, "image": {"width": 32, "height": 32},
         "budget": {"samples": 1}, "camera": {"eye": [0.4, 0.3, 3], "up": [0, 1, 0], "fov_y_deg": 20}, "emission_absorption": {
         "step_voxels": 0.125, "opacity_threshold": 1, "pre_integrated": true, "transfer_function": {"points": [
@@ -100,7 +100,7 @@ fn the_plain_form_is_of_first_order_and_the_pre_integrated_one_of_second() {
 
 #[test]
 fn without_jitter_samples_lie_in_the_middle_of_their_steps() {
-    // Along z through the middle of the box every step is whole: the picture is the sum over midpoints, in double precision.
+    // Along z through the middle of the box every step is whole, so the picture is the sum over midpoints, in double precision.
     let house = House::shared();
     let volume = house.floats([64, 64, 64], |_, _, z| 0.5 + 0.4 * (3.0 * z).sin());
     let film = |seed: u64, jitter: bool| {
@@ -130,7 +130,7 @@ fn without_jitter_samples_lie_in_the_middle_of_their_steps() {
 
 #[test]
 fn pre_integration_misses_no_spike() {
-    // A value that rises through a spike a hundredth of a step wide: its integral is what it should be, whatever the step.
+    // A value rises through a spike a hundredth of a step wide. The integral of the spike must be right whatever the step.
     let house = House::shared();
     let volume = house.floats([32, 32, 32], |_, _, z| z);
     let spike = json!({"points": [

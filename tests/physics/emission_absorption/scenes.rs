@@ -1,4 +1,4 @@
-//! Clipping, backgrounds, labels, presets, odd volumes and what cannot be had together.
+//! Clipping, backgrounds, labels, presets, odd volumes and combinations that are refused.
 
 use cloudchamber::error::Error;
 use cloudchamber::volume::RawQuery;
@@ -85,7 +85,7 @@ fn a_background_shows_through_and_transparency_is_alpha() {
     assert_eq!(picture.color(), image::ColorType::Rgba8);
     let pixel = picture.to_rgba8().get_pixel(3, 3).0;
     assert!(pixel[0] >= 254 && (f64::from(pixel[3]) - 255.0 * (1.0 - through)).abs() <= 1.0, "{pixel:?}");
-    // The same without a budget's worth of samples: the picture of the error is the film's, not the background's.
+    // The EXR has four floats for each pixel.
     assert!(house.film(&request).0.exr().unwrap().len() > 4 * 4 * SIDE * SIDE);
 }
 
@@ -103,7 +103,7 @@ fn labels_are_not_mixed() {
     request["camera"]["eye"] = json!([0, 0, 40]);
     request["camera"]["fov_y_deg"] = 5.into();
     let (film, _) = House::shared().film(&request);
-    // From +z: first ten of 300, then ten of 7.
+    // From +z, the first ten slices are of 300 and the next ten of 7.
     let (green, red) = (1.0 - (-0.2f64).exp(), (-0.2f64).exp() * (1.0 - (-0.5f64).exp()));
     for p in film.main.mean.chunks_exact(4) {
         assert!(
@@ -111,7 +111,7 @@ fn labels_are_not_mixed() {
             "{p:?}: {red} {green}"
         );
     }
-    // Without colours each label has one of its own.
+    // Without given colours, each label has a colour of its own.
     let mut request = request.clone();
     request["emission_absorption"] = json!({"transfer_function": {"preset": "labels"}});
     assert!(House::shared().film(&request).0.main.mean.iter().any(|v| *v > 0.1));
@@ -119,7 +119,7 @@ fn labels_are_not_mixed() {
 
 #[test]
 fn the_cuda_samples_opacity_is_its_own() {
-    // A byte of 255 / 9 · 2.5 stands in the middle of the third texel: yellow-orange, alpha 1, so density a step of 0.01.
+    // A byte of 255 / 9 · 1.5 is in the middle of the second texel: red with alpha 1, which is `density` per step of 0.01.
     let value = (255.0 / 9.0 * 1.5f64).round() as u8;
     let volume = raw("16,16,16", "u8", vec![value; 16 * 16 * 16]);
     let mut request =
@@ -130,7 +130,7 @@ fn the_cuda_samples_opacity_is_its_own() {
     let truth = 1.0 - (1.0f64 - 0.01).powf(2.0 / 0.01);
     for p in film.main.mean.chunks_exact(4) {
         assert!((f64::from(p[3]) - truth).abs() < 0.003, "{p:?} for opacity {truth}");
-        // Red, twice as bright as it is opaque.
+        // The pixel is red, and twice as bright as it is opaque.
         assert!((f64::from(p[0]) - 2.0 * truth).abs() < 0.02 && p[1] < 0.05 && p[2] < 1e-3, "{p:?}");
     }
 }

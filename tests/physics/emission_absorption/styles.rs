@@ -1,4 +1,4 @@
-//! Styles against closed forms, on fields whose gradients and curvatures are known.
+//! Styles against closed forms, on fields with known gradients and curvatures.
 
 use glam::{DVec3, dvec3};
 use serde_json::{Value, json};
@@ -12,7 +12,7 @@ fn white(sigma: f64) -> Value {
     json!({"points": [{"value": 0, "color": [1, 1, 1], "opacity_per_unit": sigma}]})
 }
 
-/// The middle pixel of `volume` looked at along `-eye`, orthographic, one sample.
+/// The middle pixel of `volume` seen along `-eye`, orthographic, one sample.
 fn middle(volume: &Value, eye: DVec3, parameters: &Value) -> [f64; 4] {
     let up = if eye.normalize().y.abs() > 0.9 { [1, 0, 0] } else { [0, 1, 0] };
     let (film, _) = House::shared().film(&json!({
@@ -30,7 +30,7 @@ fn ramp(slope: f64) -> Value {
 #[test]
 fn opacity_is_times_the_gradient() {
     let volume = ramp(3.0);
-    // Inside of the outermost voxels' centres, where the field is not yet clamped.
+    // The bounds are inside the outermost voxels' centres, where the field is not clamped yet.
     let own = json!({"transfer_function": white(0.2), "gradient_opacity": {"reference": 1.5}, "opacity_threshold": 1});
     let eye = dvec3(0.0, 0.0, 4.0);
     let alpha = middle(&volume, eye, &own)[3];
@@ -46,7 +46,7 @@ fn a_silhouette_is_opaque_by_its_angle() {
         let eye = 4.0 * dvec3(cos, 0.0, sin);
         let own = json!({"transfer_function": white(0.3), "silhouette": {"base": 0.5, "gain": 2, "exponent": 3}, "opacity_threshold": 1});
         let alpha = middle(&volume, eye, &own)[3];
-        // Over the middle 1.9 the field is linear; near its two ends it is clamped, which is left out of the bound.
+        // Over the middle 1.9 the field is linear. Near its two ends it is clamped, which is left out of the bound.
         let factor = 0.5 + 2.0 * (1.0 - cos).powi(3);
         let length = 2.0 / cos.max(sin);
         let truth = 1.0 - (-0.3 * factor * length).exp();
@@ -57,7 +57,7 @@ fn a_silhouette_is_opaque_by_its_angle() {
 #[test]
 fn tone_goes_from_cool_to_warm() {
     let volume = ramp(-1.0);
-    // The normal points to lower values: towards +x.
+    // The normal points to lower values, here towards +x.
     for (towards, f) in [([1, 0, 0], 1.0), ([-1, 0, 0], 0.0), ([0, 1, 0], 0.5)] {
         let own = json!({"transfer_function": white(50.0), "tone": {"cool": [0, 0.1, 0.4], "warm": [0.5, 0.2, 0]},
                          "light": {"direction": towards}});
@@ -121,12 +121,12 @@ fn curvature_is_one_over_the_radius() {
     let dark = house.floats([64, 64, 64], radius);
     let cylinder = house.floats([64, 64, 64], |x, _, z| 1.0 - (x * x + z * z).sqrt());
     for r in [0.4, 0.7] {
-        // At full = 2 / r a ridge is mixed in by half: red from 0.5 to 0.75, green and blue to 0.25.
+        // At full = 2 / r a ridge is mixed in by half: red goes from 0.5 to 0.75, green and blue to 0.25.
         for (volume, what) in [(&bright, "sphere"), (&cylinder, "cylinder")] {
             let seen = curved(volume, 1.0 - r, 2.0 / r);
             assert!((seen[0] - 0.75).abs() < 0.02 && (seen[1] - 0.25).abs() < 0.02, "{what} of radius {r}: {seen:?}");
         }
-        // From inside of a bright shell the same surface is a valley: bright where the radius is large.
+        // From inside a bright shell the same surface is a valley. The shell is bright where the radius is large.
         let inside = curved(&dark, r, 2.0 / r);
         assert!(inside[3] > 0.9, "there is something to see: {inside:?}");
     }

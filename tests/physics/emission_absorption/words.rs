@@ -1,4 +1,4 @@
-//! Floats taken as words: the picture is the one of the floats, which the reference form takes as they are.
+//! Floats that are taken as words: the picture must be that of the floats, which the reference form reads unchanged.
 
 use cloudchamber::job::Job;
 use serde_json::{Value, json};
@@ -11,7 +11,7 @@ fn request(volume: &Value, own: &Value) -> Value {
            "seed": 5, "emission_absorption": own})
 }
 
-/// What the plan says of words.
+/// The plan's reason about words.
 fn said(job: &Job) -> Option<String> {
     let resource = job.resource();
     let reasons = resource["plan"]["reasons"].as_array().unwrap();
@@ -27,7 +27,7 @@ fn ramp(low: f64, high: f64) -> Value {
 fn the_picture_is_that_of_the_floats() {
     let house = House::shared();
     let wave = house.floats([40, 37, 43], |x, y, z| 1.0 + (5.0 * x).sin() * (4.0 * y).cos() + z);
-    // Ripples of a thousandth of the range on what is opaque, and a core that holds the range.
+    // The opaque part has ripples of a thousandth of the range, and a core holds the range.
     let ripples = house.floats([48; 3], |x, y, z| {
         let r = (x * x + y * y + z * z).sqrt();
         let body = (6.0 * (0.9 - r)).clamp(0.0, 0.5);

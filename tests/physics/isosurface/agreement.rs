@@ -9,7 +9,7 @@ fn film(house: &House, volume: &Value, parameters: &Value) -> Vec<f32> {
     film_from(house, volume, &Value::Null, parameters)
 }
 
-/// From a camera, or from where all of the volume is in the picture.
+/// The film from a camera, or from a place that has all of the volume in the picture.
 fn film_from(house: &House, volume: &Value, camera: &Value, parameters: &Value) -> Vec<f32> {
     let mut request = json!({
         "technique": "isosurface", "volume": volume, "image": {"width": 72, "height": 64}, "budget": {"samples": 1},
@@ -43,7 +43,7 @@ fn worst(a: &[f32], b: &[f32]) -> f32 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
 }
 
-/// Cameras that see some twelve voxels of a side, from afar: only rays so close together leap over cells together.
+/// Cameras that see some twelve voxels of a side, from afar. Only rays that are so close together leap over cells together.
 fn close(reach: f64, voxel: f64) -> [Value; 4] {
     let fov_y_deg = 2.0 * (6.0 * voxel / reach).atan().to_degrees();
     [[0.8, 0.5, 0.6], [-0.5, -0.8, 0.4], [0.1, 0.2, -1.0], [-0.9, 0.3, 0.1]].map(|eye: [f64; 3]| {
@@ -81,7 +81,7 @@ fn skipping_changes_nothing() {
     }
 }
 
-/// How many of the pixels are further apart than that.
+/// The number of pixels that are further apart than `most`.
 fn apart(a: &[f32], b: &[f32], most: f32) -> usize {
     let far = |(a, b): &(&[f32], &[f32])| worst(a, b) > most;
     a.chunks_exact(4).zip(b.chunks_exact(4)).filter(far).count()
@@ -98,9 +98,9 @@ fn every_number_of_lanes_gives_the_same_picture() {
         for look in looks() {
             for ([here, there], voxel) in [&bytes, &floats] {
                 let (narrow, wide) = (film(house, here, &look), film(reference, there, &look));
-                // A ten-thousandth of a voxel; of a colour a fraction of a grey level.
+                // The bound is a ten-thousandth of a voxel for depth, and a fraction of a grey level for colour.
                 let most = if look["output"] == "depth" { 1e-4 * voxel } else { 1e-4 };
-                // Rounding decides whether a ray that grazes a surface meets it.
+                // Rounding decides if a ray that grazes a surface meets it.
                 let apart = apart(&narrow, &wide, most);
                 assert!(
                     apart * 1000 < narrow.len() / 4,

@@ -1,4 +1,4 @@
-//! What a request may ask and may not; volumes that are hardly any; nothing to see, with a warning; the manual's example.
+//! Permitted and refused requests; volumes of very few voxels; empty pictures, with a warning; the manual's example.
 
 use cloudchamber::error::Error;
 use cloudchamber::technique::isosurface;
@@ -41,7 +41,7 @@ fn request(volume: &Value, parameters: &Value) -> Value {
     json!({"technique": "isosurface", "volume": volume, "image": {"width": 24, "height": 20}, "budget": {"samples": 2}, "isosurface": parameters})
 }
 
-/// Whether a warning of this code is in the reply, and whether anything is in the picture.
+/// True if the reply has a warning of this code, and true if the picture shows anything.
 fn warned(body: &Value, code: &str) -> (bool, bool) {
     let job = House::shared().finish(body);
     let resource = job.resource();
@@ -83,7 +83,7 @@ fn hardly_any_voxels_and_voxels_that_are_no_numbers_are_rendered_as_what_they_ar
     ];
     for dims in [[1, 1, 1], [1, 5, 7], [6, 1, 4], [5, 3, 1], [2, 2, 2]] {
         let volume = house.floats(dims, |x, y, z| 0.55 + 0.3 * (x + y + z));
-        // A single voxel of 0.55 has no surface at 0.5; as it is, without interpolation, it is above.
+        // A single voxel of 0.55 has no surface at 0.5 if it is interpolated. Without interpolation it is above.
         let single = dims == [1, 1, 1];
         for look in &looks {
             let is_seen = !single || look["sampling"] == "nearest";
@@ -91,7 +91,7 @@ fn hardly_any_voxels_and_voxels_that_are_no_numbers_are_rendered_as_what_they_ar
             assert_eq!(found, (single, is_seen), "{dims:?}, {look}");
         }
     }
-    // A ramp with a hole of NaN: a surface on both sides of it, none around it.
+    // A ramp with a hole of NaN has a surface on both sides of the hole and none around it.
     let hole = house.floats([16; 3], |x, y, z| if x.abs() < 0.3 && y.abs() < 0.3 { f64::NAN } else { 0.5 + 0.5 * z });
     let none = house.floats([16; 3], |_, _, z| if z > 0.0 { f64::NAN } else { 0.1 });
     for look in &looks {

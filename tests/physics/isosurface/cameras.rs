@@ -11,13 +11,13 @@ const DISTANCE: f64 = 4.0;
 /// Half the width of the picture, world units.
 const HALF: f64 = 1.1;
 
-/// A camera whose rays all go this way.
+/// A camera whose rays are all parallel to `forward`.
 pub fn parallel(forward: DVec3) -> Value {
     let fov_y_deg = 2.0 * (HALF / DISTANCE).atan().to_degrees();
     json!({"eye": (-forward * DISTANCE).to_array(), "up": [0, 1, 0], "fov_y_deg": fov_y_deg, "projection": "orthographic"})
 }
 
-/// Where the ray of a pixel starts in the plane of that camera's eye.
+/// The start of a pixel's ray in the plane of that camera's eye.
 pub fn origin(pixel: usize, forward: DVec3) -> DVec3 {
     let right = forward.cross(DVec3::Y).normalize();
     let up = right.cross(forward);
@@ -48,7 +48,7 @@ fn parallel_rays_meet_waves_to_a_ten_thousandth_of_a_voxel() {
     }
 }
 
-/// What of a ray every plane leaves: n · p >= c.
+/// The part of a ray that every plane leaves: n · p >= c.
 fn cut((mut near, mut far): (f64, f64), eye: DVec3, d: DVec3, planes: &[(DVec3, f64)]) -> Option<(f64, f64)> {
     for (n, c) in planes {
         let t = (c - n.dot(eye)) / n.dot(d);

@@ -1,4 +1,4 @@
-//! How fast errors fall: with the step for the plain form, with the voxel for the refined one.
+//! The order of the errors: in the step for the plain form, in the voxel for the refined one.
 
 use glam::DVec3;
 use serde_json::{Value, json};
@@ -14,7 +14,7 @@ fn eye() -> Eye {
     Eye::at([1.3, 0.9, 2.4], 24.0)
 }
 
-/// Where the ray of a pixel meets the sphere, and how squarely.
+/// The distance at which a pixel's ray meets the sphere, and the cosine there.
 fn sphere(eye: &Eye, pixel: usize) -> Option<(f64, f64)> {
     let d = eye.direction(pixel % SIDE, pixel / SIDE, SIDE);
     let (b, c) = (eye.eye.dot(d), eye.eye.length_squared() - RADIUS * RADIUS);
@@ -28,7 +28,7 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Mean error of the depth of a sphere in a smooth field of n³ voxels.
+/// The mean error of the depth of a sphere in a smooth field of n³ voxels.
 fn sphere_error(n: usize, interpolation: &str) -> f64 {
     let house = House::shared();
     let volume = house.floats([n; 3], |x, y, z| (-(x * x + y * y + z * z)).exp());
@@ -51,7 +51,7 @@ fn the_depth_of_a_smooth_surface_is_of_the_interpolations_order_in_the_voxel() {
     }
 }
 
-/// Where the first voxel at or above the isovalue starts along a ray, by a scan in 1000ths of a voxel.
+/// The start of the first voxel at or above the isovalue along a ray, by a scan in 1000ths of a voxel.
 fn face(grid: &Grid, isovalue: f64, eye: &Eye, d: DVec3) -> Option<f64> {
     let (near, far) = inside(eye.eye, d, DVec3::ONE)?;
     let step = 2e-3 / grid.dims[0] as f64;
@@ -73,7 +73,7 @@ fn the_plain_forms_depth_is_of_first_order_in_the_step() {
         let parameters = json!({"isovalue": isovalue, "sampling": "nearest", "step_voxels": step_voxels});
         let found = depths(house, &volume, &eye.json(), &parameters);
         let beyond: Vec<f64> = found.iter().zip(&truth).filter_map(|(f, t)| Some((*f)? - (*t)?)).collect();
-        // A corner that is thinner than a step may be missed, and the next voxel met instead.
+        // A corner that is thinner than a step may be missed, and the next voxel is then met instead.
         let step = step_voxels * 2.0 / n as f64;
         let late = beyond.iter().filter(|b| **b > step + 1e-4).count();
         assert!(late * 10 < beyond.len(), "{late} of {} are later than a step", beyond.len());
@@ -84,7 +84,7 @@ fn the_plain_forms_depth_is_of_first_order_in_the_step() {
     let order = (errors[0] / errors[3]).log2() / 3.0;
     println!("plain form: {errors:?}, order {order:.2}");
     assert!((order - 1.0).abs() < 0.15, "order {order:.2} from {errors:?}");
-    // A sample is anywhere in the step that the face is in.
+    // A sample may be anywhere in the step that has the face.
     assert!((errors[1] / (0.5 * 0.5 * 2.0 / n as f64) - 1.0).abs() < 0.15, "{errors:?}");
 }
 

@@ -1,4 +1,4 @@
-//! Where rays cross, against a dense scan and bisection of the interpolant in double precision.
+//! The crossings of rays, against a dense scan and bisection of the interpolant in double precision.
 
 use glam::{DVec3, dvec3};
 use serde_json::{Value, json};
@@ -12,7 +12,7 @@ const DIMS: [usize; 3] = [40, 37, 43];
 pub const VOXEL: f64 = 2.0 / 43.0;
 pub const ISOVALUE: f64 = 0.47;
 
-/// The distance from the eye that each pixel shows; `None` where there is nothing.
+/// The distance from the eye that each pixel shows; `None` if there is nothing.
 pub fn depths(house: &House, volume: &Value, camera: &Value, parameters: &Value) -> Vec<Option<f64>> {
     let mut request = json!({
         "technique": "isosurface", "volume": volume, "camera": camera, "image": {"width": SIDE, "height": SIDE},
@@ -22,14 +22,14 @@ pub fn depths(house: &House, volume: &Value, camera: &Value, parameters: &Value)
     film_depths(house, &request)
 }
 
-/// The same of a whole request.
+/// The distances that the film of a whole request shows.
 pub fn film_depths(house: &House, request: &Value) -> Vec<Option<f64>> {
     let (film, _) = house.film(request);
     assert!(film.main.mean.iter().all(|v| v.is_finite()));
     film.main.mean.chunks_exact(4).map(|p| (p[3] > 0.5).then(|| f64::from(p[0]))).collect()
 }
 
-/// Waves with a period of `period` voxels: smooth, and with much to meet.
+/// Waves with a period of `period` voxels. They are smooth and have many surfaces.
 pub fn waves(period: f64) -> Grid {
     let k = std::f64::consts::TAU / (period * VOXEL);
     let value =
@@ -42,7 +42,7 @@ pub fn waves(period: f64) -> Grid {
 
 pub struct Crossing {
     pub t: f64,
-    /// Change of the value over a voxel there.
+    /// The change of the value over a voxel there.
     pub slope: f64,
 }
 
@@ -67,10 +67,10 @@ pub fn crossings(f: impl Fn(f64) -> f64, near: f64, far: f64) -> Vec<Crossing> {
     found
 }
 
-/// Whether what was found is the first crossing, or a later one where all before come in pairs that are less than a step apart:
-/// between two samples those do not show. Nothing may be found only where there is no crossing left.
+/// True if the found crossing is the first, or a later one if all before come in pairs less than a step apart, since two samples do not show such a
+/// pair. Nothing may be found only if no crossing is left.
 pub fn check(found: Option<f64>, truth: &[Crossing], step: f64, case: &str) -> bool {
-    // Single precision tells values 1e-7 apart: where a ray grazes the surface, that is far.
+    // Single precision tells values 1e-7 apart, which is far along a ray that grazes the surface.
     let slack = |c: &Crossing| 1e-4 * VOXEL + 1e-6 + 2e-7 * VOXEL / c.slope;
     let is = |c: &Crossing| found.is_some_and(|t| (t - c.t).abs() <= slack(c));
     let mut rest = truth;
@@ -129,7 +129,7 @@ fn a_crossing_is_met_to_a_ten_thousandth_of_a_voxel() {
 #[test]
 fn nothing_thicker_than_a_step_is_missed() {
     let house = House::shared();
-    // Waves of six voxels: much of what is above the isovalue is about as thick as the longer steps.
+    // In waves of six voxels, many parts above the isovalue are about as thick as the longer steps.
     for step_voxels in [0.25, 0.5, 1.0, 2.0, 4.0] {
         let met = compare(house, &waves(6.0), &Eye::at([2.1, 1.7, 2.3], 40.0), "trilinear", step_voxels);
         assert!(met > 150, "step {step_voxels}: {met}");
@@ -171,7 +171,7 @@ fn an_orthographic_camera_measures_from_its_eye_too() {
     let span = 8.0 * 10f64.to_radians().tan();
     for (pixel, found) in depths(house, &volume, &camera, &json!({"isovalue": 0.1})).into_iter().enumerate() {
         let x = ((pixel % SIDE) as f64 + 0.5) / SIDE as f64 * span - 0.5 * span;
-        // A linear field crosses where z = 0.1 - 0.3 x, away from the faces.
+        // A linear field crosses at z = 0.1 - 0.3 x, away from the faces.
         let truth = 4.0 - (0.1 - 0.3 * x);
         assert!((found.unwrap() - truth).abs() < 1e-5, "{pixel}: {found:?} for {truth}");
     }

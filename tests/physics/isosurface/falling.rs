@@ -31,7 +31,7 @@ fn film(volume: &Value, own: &Value) -> Vec<f32> {
     House::shared().film(&request).0.main.mean.clone()
 }
 
-/// No voxel has one of these values, where a rounding would decide.
+/// The isovalues are values of no voxel, since rounding would decide there.
 fn forms() -> Vec<Value> {
     let inner = json!({"isovalue": 139.7, "color": [0.2, 0.9, 0.4], "opacity": 0.6});
     let outer = json!({"isovalue": 111.3, "color": [0.9, 0.3, 0.1], "opacity": 0.3});
@@ -58,7 +58,7 @@ fn a_falling_scale_shows_what_a_rising_one_shows_of_the_same_values() {
         let other = house.file(scan(raw, slope, inter));
         for own in forms() {
             let (a, b) = (film(&other, &own), film(&rising, &own));
-            // World units of a ten-thousandth of a voxel, or parts of a grey level.
+            // The bound is a ten-thousandth of a voxel in world units, or a part of a grey level.
             let most = if own["output"] == "depth" { 1e-4 } else { 2e-5 };
             let off = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
             assert!(off < most, "{raw:?}, slope {slope}, {own}: {off:e}");

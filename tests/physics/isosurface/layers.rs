@@ -1,4 +1,4 @@
-//! Several surfaces, some of them transparent: what is composited in which order.
+//! Several surfaces, some of them transparent, and the order in which they are composited.
 
 use serde_json::{Value, json};
 
@@ -42,7 +42,7 @@ fn what_is_in_front_hides_its_part_of_what_is_behind() {
 
 #[test]
 fn a_ray_meets_the_far_side_of_a_transparent_surface() {
-    // Red, green, green, red: each surface twice.
+    // The order is red, green, green, red: the ray meets each surface twice.
     let pair = json!([surface(0.2, [1.0, 0.0, 0.0], 0.3), surface(0.4, [0.0, 1.0, 0.0], 0.5)]);
     let through = 0.7 * 0.5 * 0.5;
     near(middle(&pair, &json!({})), [0.3 + through * 0.3, 0.7 * 0.5 + 0.7 * 0.5 * 0.5, 0.0, 1.0 - through * 0.7]);
@@ -52,7 +52,7 @@ fn a_ray_meets_the_far_side_of_a_transparent_surface() {
 
 #[test]
 fn surfaces_within_one_step_keep_their_order() {
-    // Steps of a third of the box: the ray passes several values between two samples, rising and falling.
+    // With steps of a third of the box, the ray passes several values between two samples, rising and falling.
     let all = json!([
         surface(0.30, [1.0, 0.0, 0.0], 0.5),
         surface(0.31, [0.0, 1.0, 0.0], 0.5),
@@ -69,6 +69,6 @@ fn surfaces_within_one_step_keep_their_order() {
 fn depth_is_that_of_the_first_however_transparent() {
     let surfaces = json!([surface(0.4, [1.0; 3], 0.1), surface(0.2, [1.0; 3], 0.1)]);
     let [depth, .., alpha] = middle(&surfaces, &json!({"output": "depth"}));
-    // 1 − r is linear between voxels but for its bend across the ray, of second order in the voxel.
+    // 1 − r is linear between voxels except for its bend across the ray, which is of second order in the voxel.
     assert!((depth - (3.0 - 0.8)).abs() < 2e-3 && alpha == 1.0, "{depth}, {alpha}");
 }

@@ -9,7 +9,7 @@ use crate::emission_absorption::oracle::Eye;
 
 const RADIUS: f64 = 0.6;
 
-/// The first channel of each pixel of a sphere in exp(−r²), and whether anything is there.
+/// The first channel of each pixel of a sphere in exp(−r²), and true if the pixel shows anything.
 fn lit(eye: &Eye, light: &Value, parameters: &Value) -> Vec<(f64, bool)> {
     let house = House::shared();
     let volume = house.floats([48; 3], |x, y, z| (-(x * x + y * y + z * z)).exp());

@@ -1,4 +1,4 @@
-//! A linear field on grids that are neither straight nor square: its surface is a plane in the world, lit in closed form.
+//! A linear field on grids that are neither straight nor square. Its surface is a plane in the world, lit in closed form.
 
 use glam::{DMat3, DVec3, dvec3};
 use serde_json::{Value, json};
@@ -12,7 +12,7 @@ const DIMS: [usize; 3] = [15, 22, 13];
 const GRADIENT: DVec3 = dvec3(0.6, -0.35, 0.8);
 const LEVEL: f64 = 5.1;
 
-/// Straight with long voxels, skewed, and mirrored: index axes of which one runs the other way.
+/// The grids: straight with long voxels, skewed, and mirrored with an index axis that runs the other way.
 fn grids() -> [DMat3; 3] {
     let skewed = DMat3::from_cols(dvec3(0.16, 0.04, -0.02), dvec3(-0.03, 0.11, 0.03), dvec3(0.04, -0.02, 0.17));
     [DMat3::from_diagonal(dvec3(0.15, 0.07, 0.21)), skewed, skewed * DMat3::from_diagonal(dvec3(1.0, -1.0, 1.0))]
@@ -37,7 +37,7 @@ fn linear(axes: DMat3) -> Vec<u8> {
     nrrd(&fields, &(0..nx * ny * nz).flat_map(|i| value(i).to_le_bytes()).collect::<Vec<u8>>())
 }
 
-/// The pixels whose rays meet the plane at least so many voxels inside of the grid: pixel, ray, and distance.
+/// The pixels whose rays meet the plane at least `voxels` voxels inside the grid: pixel, ray, and distance.
 fn meets(axes: DMat3, eye: &Eye, voxels: f64) -> Vec<(usize, DVec3, f64)> {
     let meet = |pixel: usize| {
         let d = eye.direction(pixel % SIDE, pixel / SIDE, SIDE);
@@ -72,7 +72,7 @@ fn the_plane_is_where_it_is_in_the_world() {
     }
 }
 
-/// Directions and colours of two lights, one of which shines on the back.
+/// The directions and colours of two lights, one of which shines on the back.
 const LIGHTS: [(DVec3, DVec3); 2] =
     [(dvec3(1.0, 0.2, 2.0), dvec3(0.9, 0.5, 0.2)), (dvec3(0.3, -1.0, -0.6), dvec3(0.1, 0.4, 0.8))];
 
@@ -81,7 +81,7 @@ fn light() -> Value {
     json!({"lights": lights, "ambient": 0.1, "diffuse": 0.6, "specular": 0.3, "shininess": 9})
 }
 
-/// Blinn-Phong, from both sides.
+/// The light of Blinn-Phong, from both sides.
 fn blinn_phong(d: DVec3, colour: DVec3) -> DVec3 {
     let n = GRADIENT.normalize();
     LIGHTS.iter().fold(0.1 * colour, |sum, (direction, light)| {

@@ -1,4 +1,4 @@
-//! Slabs and balls at random places, along parallel rays: what is thicker than a step shows.
+//! Slabs and balls at random places, along parallel rays. Bodies that are thicker than a step must show.
 
 use glam::{DVec3, dvec3};
 use serde_json::json;
@@ -10,7 +10,7 @@ use crate::common::writers::Random;
 use crate::emission_absorption::oracle::inside;
 use crate::projection::grid::Grid;
 
-/// What makes a voxel of that side.
+/// The number of voxels along an axis that gives a voxel its side.
 const N: usize = 43;
 const ISOVALUE: f64 = 0.5;
 
@@ -37,7 +37,7 @@ fn body(random: &mut Random, half: f64, ball: bool) -> Grid {
     Grid { dims: [N; 3], voxels: (0..N * N * N).map(value).collect() }
 }
 
-/// How many rays meet something, meet what is hardly thicker than a step, and miss what is thinner.
+/// The number of rays that meet something, that meet a body hardly thicker than a step, and that miss a thinner one.
 #[derive(Default, Debug)]
 struct Seen {
     met: usize,

@@ -1,4 +1,4 @@
-//! Voxels that are no numbers, and volumes whose surface nobody has named.
+//! Voxels that are NaN, and volumes with a default isovalue.
 
 use glam::{DVec3, dvec3};
 use serde_json::{Value, json};
@@ -9,7 +9,7 @@ use crate::common::mri_head;
 use crate::common::writers::Nifti;
 use crate::emission_absorption::oracle::{Eye, inside};
 
-/// Without skipping, since a cell whose voxels are all on one side of the isovalue would hide what is wrong in it.
+/// The picture without skipping. A cell with all its voxels on one side of the isovalue would hide errors inside it.
 fn picture(house: &House, volume: &Value, eye: &Eye, own: &Value, step_voxels: f64) -> Vec<f32> {
     let mut request = json!({
         "technique": "isosurface", "volume": volume, "camera": eye.json(), "image": {"width": SIDE, "height": SIDE},
@@ -20,7 +20,7 @@ fn picture(house: &House, volume: &Value, eye: &Eye, own: &Value, step_voxels: f
     house.film(&request).0.main.mean.clone()
 }
 
-/// Surfaces would be around the hole if what is no number were taken for a small or a great one.
+/// The hole would have surfaces around it if NaN were taken for a small or a great value.
 #[test]
 fn there_is_no_surface_around_what_is_no_number() {
     let house = House::shared();
@@ -47,7 +47,7 @@ const CELLS: [usize; 3] = [20, 24, 22];
 const LEVEL: f64 = 0.13;
 const GRADIENT: DVec3 = dvec3(0.2, -0.1, 1.0);
 
-/// How many voxels a point is from the hole in the ramp; less than 0 in it.
+/// The distance of a point from the hole in the ramp, in voxels; less than 0 inside it.
 fn from_hole(p: DVec3) -> f64 {
     let voxels = DVec3::from_array(CELLS.map(|n| n as f64)) / 2.0;
     ((p - dvec3(0.1, -0.2, 0.1)).abs() * voxels - 4.5).max_element()
@@ -71,7 +71,7 @@ fn a_surface_goes_on_beside_a_hole_and_stops_in_it() {
                 let d = eye.direction(pixel % SIDE, pixel / SIDE, SIDE);
                 let t = (LEVEL - GRADIENT.dot(eye.eye)) / GRADIENT.dot(d);
                 let at = eye.eye + d * t;
-                // Near the faces the ramp levels off, and near the hole a step may start in it.
+                // Near the faces the ramp levels off, and near the hole a step may start inside it.
                 if inside(eye.eye, d, DVec3::ONE).is_none() || at.abs().max_element() > 0.8 {
                     continue;
                 }
@@ -88,7 +88,7 @@ fn a_surface_goes_on_beside_a_hole_and_stops_in_it() {
     assert!(beside > 300 && within > 100, "{beside} and {within} rays");
 }
 
-/// The isovalue that a render says it has chosen.
+/// The isovalue that a render reports as its choice.
 fn chosen(volume: &Value) -> f64 {
     let body = json!({"technique": "isosurface", "volume": volume, "image": {"width": 4, "height": 4}, "budget": {"samples": 1}});
     let resource = House::shared().finish(&body).resource();

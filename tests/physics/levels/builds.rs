@@ -25,7 +25,7 @@ fn sources() -> Vec<Source> {
     run::sources().collect()
 }
 
-/// One of a kernel's variants for a level: the types of voxels in turn, and of those of a type another at each level.
+/// One of a kernel's variants for a level. The types of voxels take turns, and so do the variants of a type.
 fn one_of(variants: &[Variant], kernel: usize, level: usize) -> Variant {
     let voxel = VoxelType::ALL[(kernel + level) % VoxelType::ALL.len()];
     let of_type: Vec<_> = variants.iter().filter(|v| v.voxel.is_none_or(|own| own == voxel)).collect();
@@ -38,7 +38,7 @@ fn compile(compiler: &Compiler, level: &Level, source: &Source, variant: &Varian
     built.map_err(|said| format!("{} ({}, {} lanes): {}:\n{said}", level.name, level.cpu, level.lanes, variant.label()))
 }
 
-/// Compiles them on all cores and fails with what the compiler says of those that do not build.
+/// Compiles the jobs on all cores, and fails with the compiler's messages about those that do not build.
 fn all_build(jobs: &[(&Level, &Source, Variant)]) {
     let (compiler, started) = (compiler(), Instant::now());
     let done: Vec<_> =

@@ -1,14 +1,14 @@
-//! Levels of processors, and a compiler of kernels for any of them: clang of the LLVM that PoCL is built on, told what PoCL tells it.
+//! Levels of processors, and a compiler of kernels for any of them: clang of PoCL's LLVM, with the options that PoCL passes.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// What processors of a level have in common.
+/// The common properties of the processors of a level.
 #[derive(Debug)]
 pub struct Level {
     pub name: &'static str,
-    /// As many as fit into a vector.
+    /// The number of lanes, which fill a vector.
     pub lanes: u32,
     triple: &'static str,
     /// The processor that PoCL compiles for at this level.
@@ -17,7 +17,7 @@ pub struct Level {
 
 const X86: &str = "x86_64-pc-linux-gnu";
 
-/// From the widest vectors to the narrowest, by processors.
+/// The levels of each kind of processor, from the widest vectors to the narrowest.
 pub const LEVELS: [Level; 5] = [
     Level { name: "AVX-512", lanes: 16, triple: X86, cpu: "skylake-avx512" },
     Level { name: "AVX2", lanes: 8, triple: X86, cpu: "haswell" },
@@ -26,10 +26,10 @@ pub const LEVELS: [Level; 5] = [
     Level { name: "ARM64", lanes: 4, triple: "aarch64-linux-gnu", cpu: "cortex-a72" },
 ];
 
-/// PoCL's headers, which stand before every kernel.
+/// The headers of PoCL, which are included before every kernel.
 const HEADERS: &str = "/usr/share/pocl/include";
 
-/// What PoCL 3.1 says to its compiler of every kernel (`POCL_DEBUG=all` shows it), less the program's own options and the target.
+/// The options that PoCL 3.1 passes to its compiler for every kernel (`POCL_DEBUG=all` shows them), less the program's own options and the target.
 const OPTIONS: &str = "-cc1 -x cl -Dcl_khr_int64 -DPOCL_DEVICE_ADDRESS_BITS=64 -D__USE_CLANG_OPENCL_C_H -Dinline= \
     -cl-kernel-arg-info -D__ENDIAN_LITTLE__=1 -D__IMAGE_SUPPORT__=1 -DCL_DEVICE_MAX_GLOBAL_VARIABLE_SIZE=0 \
     -D__OPENCL_VERSION__=300 -D__OPENCL_C_VERSION__=120 -fno-builtin";
@@ -47,7 +47,7 @@ const EXTENSIONS: [&str; 11] = [
     "cl_khr_fp64",
 ];
 
-/// A clang and a folder of what it is known to compile.
+/// A clang and a folder of the programs that it is known to compile.
 pub struct Compiler {
     program: String,
     version: String,
@@ -55,7 +55,7 @@ pub struct Compiler {
 }
 
 impl Compiler {
-    /// The one for the PoCL that says this of its version, such as `OpenCL 3.0 PoCL 3.1+debian … LLVM 15.0.6, …`.
+    /// The compiler for a PoCL with this version text, such as `OpenCL 3.0 PoCL 3.1+debian … LLVM 15.0.6, …`.
     pub fn of(platform_version: &str) -> Self {
         let number = platform_version.split("LLVM ").nth(1).and_then(|rest| rest.split('.').next());
         let program = format!("clang-{}", number.unwrap_or_else(|| panic!("no LLVM in {platform_version}")));
@@ -67,11 +67,11 @@ impl Compiler {
         Self { program, version, kept }
     }
 
-    /// Compiles to the level's assembly: clang says some things only while it makes code, such as that a vector is too wide to be passed
+    /// Compiles to the level's assembly. Clang gives some messages only while it makes code, such as that a vector is too wide to be passed
     /// (`-Wpsabi`), and the level's instructions are chosen last of all. It does not optimise, which would take twice as long.
     ///
     /// # Errors
-    /// What the compiler says.
+    /// The compiler's message.
     pub fn compile(&self, level: &Level, options: &str, text: &str) -> Result<(), String> {
         let extensions: String = EXTENSIONS.iter().map(|e| format!(",+{e}")).collect();
         let mut front: Vec<String> = OPTIONS.split_whitespace().map(str::to_owned).collect();
@@ -80,12 +80,12 @@ impl Compiler {
         front.extend(["-I", HEADERS, "-include", "_kernel.h"].map(str::to_owned));
         front.extend(options.split_whitespace().map(str::to_owned));
         let code = self.run(level, front.into_iter().chain(["-emit-llvm".into()]), text.as_bytes())?;
-        // Only some back ends know how a kernel is called; PoCL, too, makes it a plain function before it gets there.
+        // Only some back ends know how to call a kernel. PoCL also makes it a plain function before it gets there.
         let plain = code.replace("spir_kernel ", "");
         self.run(level, ["-cc1", "-x", "ir", "-S"].map(str::to_owned).into_iter(), plain.as_bytes()).map(drop)
     }
 
-    /// What clang makes of its input for the level.
+    /// The output of clang for the level.
     fn run(&self, level: &Level, arguments: impl Iterator<Item = String>, input: &[u8]) -> Result<String, String> {
         let mut child = Command::new(&self.program)
             .args(arguments)
@@ -95,14 +95,14 @@ impl Compiler {
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
-        // It reads all before it writes anything. That it stops reading is its own to explain.
+        // Clang reads all input before it writes anything. If it stops reading, its messages have the reason.
         drop(child.stdin.take().unwrap().write_all(input));
         let output = child.wait_with_output().unwrap();
         let [made, said] = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned());
         if output.status.success() { Ok(made) } else { Err(said) }
     }
 
-    /// The same, but what was once compiled is not compiled again; true if it had to be.
+    /// Compiles a program unless it was compiled before. True if it had to be compiled.
     ///
     /// # Errors
     /// As [`Compiler::compile`].

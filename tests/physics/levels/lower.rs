@@ -1,4 +1,4 @@
-//! The program at a level below the host's: the features that it is without are hidden from PoCL (`hide_features.c`).
+//! The program at a level below the host's. The features that the level lacks are hidden from PoCL (`hide_features.c`).
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -8,12 +8,12 @@ use serde_json::Value;
 use super::compiler::{LEVELS, Level};
 use crate::common::picture::Picture;
 
-/// A level that a higher one can be made to work at.
+/// A level at which a host of a higher one can be made to work.
 pub struct Lower {
     pub level: &'static Level,
-    /// Features that the level above has and this one has not.
+    /// The features that the level above has and this one lacks.
     hidden: &'static str,
-    /// What PoCL then takes the processor for.
+    /// The processors for which PoCL may then take the host's.
     cpus: &'static [&'static str],
 }
 
@@ -23,7 +23,7 @@ const LOWER: [Lower; 3] = [
     Lower { level: &LEVELS[3], hidden: "avx512,avx", cpus: &["penryn", "core2", "x86-64"] },
 ];
 
-/// The program and what hides features from it.
+/// The program, and the library that hides features from it.
 pub struct Program {
     folder: tempfile::TempDir,
     shim: PathBuf,
@@ -36,7 +36,7 @@ fn succeeded(command: &mut Command) -> Output {
 }
 
 impl Program {
-    /// Builds what hides features.
+    /// Builds the library that hides features.
     pub fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let shim = folder.path().join("hide_features.so");
@@ -51,7 +51,7 @@ impl Program {
         Self { folder, shim }
     }
 
-    /// A command of the program at the host's level or a lower one. The levels' compiled kernels are kept apart, and from run to run.
+    /// A command of the program at the host's level or a lower one. Compiled kernels are kept for each level, and from run to run.
     fn command(&self, name: &str, lower: Option<&Lower>) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_cloudchamber"));
         command.arg(name).arg("--data-dir").arg(self.folder.path());
@@ -71,7 +71,8 @@ impl Program {
         serde_json::from_slice::<Value>(&output.stdout).unwrap()["would_use"].take()
     }
 
-    /// The levels that this host can be made to work at, its next lower one first. Each is asked whether PoCL takes it for that.
+    /// The levels at which this host can be made to work, the next lower one first. Fails unless PoCL then takes the processor for one of the
+    /// level.
     pub fn levels_below(&self) -> Vec<&'static Lower> {
         let host = self.device(None);
         let (version, width) = (host["version"].as_str().unwrap(), host["native_vector_width_float"].as_u64());

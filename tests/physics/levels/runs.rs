@@ -1,4 +1,4 @@
-//! What the levels below the host's draw is what the host draws.
+//! The pictures of the levels below the host's are the host's pictures.
 
 use cloudchamber::technique;
 use std::time::Instant;
@@ -7,7 +7,7 @@ use super::lower::{Lower, Program};
 use crate::common::pictures::{self, Asked};
 use crate::common::say;
 
-/// The bound that pictures of other numbers of lanes are held to.
+/// Checks the bound on pictures of other numbers of lanes.
 fn check_same(program: &Program, lower: &Lower, asked: &Asked) {
     let started = Instant::now();
     let (native, made) =
@@ -19,7 +19,7 @@ fn check_same(program: &Program, lower: &Lower, asked: &Asked) {
     assert!(other.is_none(), "{} at {level}: {}", asked.name, other.unwrap_or_default());
 }
 
-/// The first of the list for each technique; the program itself knows the volumes of these.
+/// The first request of the list for each technique. The program itself knows their volumes.
 fn one_of_each_technique() -> Vec<Asked> {
     let mut found: Vec<Asked> = Vec::new();
     for asked in pictures::list().into_iter().filter(|a| !a.needs_house()) {

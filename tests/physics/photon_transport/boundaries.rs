@@ -6,7 +6,7 @@ use super::run::{fraction, judge, simulate, with};
 use super::trackers::LEDGER;
 use crate::common::engine::House;
 
-/// Reflectance of unpolarised light, in double precision.
+/// The reflectance of unpolarised light, in double precision.
 fn fresnel(n1: f64, n2: f64, cosine: f64) -> f64 {
     let sine = n1 / n2 * (1.0 - cosine * cosine).sqrt();
     if sine >= 1.0 {
@@ -37,7 +37,7 @@ fn a_pane_reflects_and_transmits_what_fresnel_says() {
         let (specular, _) = fraction(&simulate(&pane(index, angle)), "specular");
         assert!((specular - r).abs() < 2e-5, "{index} at {angle}: specular {specular} for {r}");
     }
-    // Where nothing changes, nothing reflects, however flat the ray.
+    // A boundary without a change of index reflects nothing, however flat the ray is.
     let flat = simulate(&pane(1.0, 89.999));
     assert!((fraction(&flat, "exit_plus_z").0 - 1.0).abs() < 1e-6, "{flat}");
 }
@@ -50,7 +50,7 @@ fn light_that_goes_through_comes_out_at_snells_angle() {
     let scene = json!({"photons": 1000, "grid": [1, 1, 1], "layers": layers, "exit_histogram": bins, "boundary": {"fresnel": true, "specular_entry": false},
         "source": {"direction": [0, angle.sin(), angle.cos()]}});
     let h = &simulate(&scene)["exit_histogram"]["plus_z"];
-    // Through both layers it is moved aside by tan of the angle in each.
+    // Each layer moves the ray aside by the tangent of its angle there.
     let aside: f64 = [1.2, 1.7].iter().map(|n| (angle.sin() / n).asin().tan()).sum();
     assert!((1.3..1.4).contains(&aside), "{aside}");
     let there = h[1][1]["value"].as_f64().unwrap();
@@ -67,7 +67,7 @@ fn no_light_leaves_past_the_critical_angle() {
     let thin = json!({"thickness_mm": 1, "mu_a_per_mm": 0, "mu_s_per_mm": 0, "index": 1});
     for degrees in [42.0, 60.0, 89.9f64] {
         let angle = degrees.to_radians();
-        // From within the dense layer, whose critical angle is 41.8 degrees: up and down until it is absorbed.
+        // The ray starts within the dense layer, whose critical angle is 41.8 degrees, and goes up and down until it is absorbed.
         let scene = json!({"photons": 5000, "grid": [1, 1, 1], "layers": [thin, dense, thin], "boundary": {"fresnel": true},
             "source": {"position_mm": [30, 30, 1.5], "direction": [angle.sin(), 0, angle.cos()]}});
         let result = simulate(&scene);
@@ -92,7 +92,7 @@ fn mirrors_and_cyclic_faces_stand_for_a_medium_without_end() {
 
 #[test]
 fn a_gate_ends_photons_to_the_millimetre() {
-    // 1 ns in index 1.5 is 199.86 mm: without collisions all of it is flown.
+    // 1 ns in index 1.5 is 199.86 mm. Without collisions, a photon flies all of it.
     let layers = json!([{"thickness_mm": 1000, "mu_a_per_mm": 0, "mu_s_per_mm": 0, "index": 1.5}]);
     let result = simulate(&json!({"photons": 1000, "grid": [1, 1, 1], "layers": layers, "time_gate_ns": 1}));
     assert!((fraction(&result, "gated").0 - 1.0).abs() < 1e-9, "{result}");
@@ -102,7 +102,7 @@ fn a_gate_ends_photons_to_the_millimetre() {
 
 #[test]
 fn each_source_lights_what_it_should() {
-    // In a vacuum what a source sends out arrives on the face that it is aimed at.
+    // In a vacuum the light of a source arrives at the face that it is aimed at.
     let scene = |source: Value| {
         json!({"photons": 200_000, "size_mm": [2, 2, 2], "grid": [1, 1, 1], "source": source,
         "medium": {"mu_a_per_mm": 0, "mu_s_per_mm": 0, "index": 1}, "exit_histogram": {"radius_edges_mm": [0, 0.25, 0.5, 1, 3], "angle_edges_deg": [0, 10, 20, 40, 90]}})
@@ -117,7 +117,7 @@ fn each_source_lights_what_it_should() {
     let planar = json!({"type": "planar", "position_mm": [0, 0, -1], "edge_u_mm": [1, 0, 0], "edge_v_mm": [0, 2, 0]});
     // A circle of radius 1/2 about the corner of the source covers a quarter of pi / 4 of its two square millimetres.
     assert!((ring(planar.clone(), 0) + ring(planar, 1) - std::f64::consts::PI / 16.0 / 2.0).abs() < 0.005);
-    // A cone of 20 degrees is even over the sphere; a Lambertian source is even over sin².
+    // A cone of 20 degrees is even over the sphere. A Lambertian source is even over sin².
     let angles = |source: Value, i: usize| {
         let h = simulate(&scene(source))["exit_histogram"]["plus_z"].clone();
         (0..4).map(|r| h[r][i]["value"].as_f64().unwrap()).sum::<f64>()

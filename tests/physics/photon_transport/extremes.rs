@@ -1,4 +1,4 @@
-//! Where methods break: the ledger closes and nothing is lost in silence, whatever the scene.
+//! The limits of the methods: the ledger closes and nothing is lost in silence, whatever the scene.
 
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
@@ -43,7 +43,7 @@ fn no_extreme_loses_energy() {
         for fresnel in [false, true] {
             let result =
                 closes(&with(&with(&base, &medium(a, s, index, g)), &json!({"boundary": {"fresnel": fresnel}})));
-            // Only light that total reflection keeps in may be given up.
+            // Only light that total reflection traps may be given up.
             let trapped = fresnel && index > 1.0 && a == 0.0;
             assert!(trapped || result["faults"] == 0, "{a} {s} {index} {g}: {result}");
         }
@@ -81,7 +81,7 @@ fn a_slab_of_optical_depth_200_lets_through_what_it_should() {
     let scene = json!({"photons": 40_000, "grid": [1, 1, 1], "layers": [{"thickness_mm": 200, "mu_a_per_mm": 0, "mu_s_per_mm": 1, "index": 1}]});
     let result = closes(&scene);
     let (through, error) = fraction(&result, "exit_plus_z");
-    // Normal incidence: the beam enters like a source at depth z0 + 1, exactly 5/3 in the limit of isotropic scattering.
+    // At normal incidence the beam enters like a source at depth z0 + 1, exactly 5/3 in the limit of isotropic scattering.
     let truth = (1.0 + 0.7104) / (200.0 + 2.0 * 0.7104);
     assert!((through - truth).abs() < 4.0 * error + 0.02 * truth, "{through} ± {error} for {truth}");
 }
@@ -128,7 +128,7 @@ fn two_hundred_random_scenes_keep_their_energy() {
     );
     let run = runner.run(&all, |(media, shape, (bx, by), source, tracking, tally, (fresnel, gated, seed), survival)| {
         let one = |m: &(f64, f64, f64, usize), index: f64| json!({"mu_a_per_mm": m.0, "mu_s_per_mm": m.1, "index": index, "phase": phases[m.3]});
-        // Trackers that do not see interfaces get one index.
+        // Trackers that do not see interfaces get a single index.
         let index = |i: usize| if tracking == "auto" || tracking == "exact" { media[i].2 } else { media[0].2 };
         let every: Vec<Value> = (0..3).map(|i| one(&media[i], index(i))).collect();
         let shape = match shape {
@@ -157,7 +157,7 @@ fn two_hundred_random_scenes_keep_their_energy() {
 
 #[test]
 fn the_error_falls_with_the_root_of_the_photons_and_has_no_floor() {
-    // From ten thousand to forty million: each sixteenfold is a fourth of the spread, to what eight seeds can tell.
+    // From ten thousand to forty million photons, each factor of sixteen gives a fourth of the spread, as far as eight seeds can tell.
     let spread = |photons: u64| {
         let scene = json!({"photons": photons, "grid": [1, 1, 1], "layers": [{"thickness_mm": 1, "mu_a_per_mm": 0.2, "mu_s_per_mm": 1, "index": 1}]});
         let runs: Vec<f64> =

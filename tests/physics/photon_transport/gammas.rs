@@ -15,7 +15,7 @@ fn kept(energy_kev: f64, mu: f64) -> f64 {
     1.0 / (1.0 + energy_kev / ELECTRON_KEV * (1.0 - mu))
 }
 
-/// Density per steradian of the cosine, not normalised.
+/// The density per steradian of the cosine, not normalised.
 fn density(energy_kev: f64, mu: f64) -> f64 {
     let e = kept(energy_kev, mu);
     e * e * (e + 1.0 / e - 1.0 + mu * mu)
@@ -55,8 +55,8 @@ fn the_density_of_these_tests_has_the_published_means_and_energies() {
     }
 }
 
-/// In matter that attenuates alike at all energies and scatters one collision in ten thousand, all that leaves has been scattered
-/// once: angles and energies are those of the density.
+/// The matter attenuates alike at all energies and scatters one collision in ten thousand, so that all light that leaves has been scattered once.
+/// Angles and energies are those of the density.
 #[test]
 fn angles_and_energies_are_klein_and_nishinas() {
     let (tau, albedo, photons) = (0.7f64, 1e-4, 3_000_000.0);
@@ -117,8 +117,8 @@ fn a_narrow_beam_is_attenuated_as_the_tables_say() {
     }
 }
 
-/// One photon through a slab of water, in double precision: angles by rejection from a uniform cosine, each collision absorbed or
-/// scattered as a whole. What leaves before and behind, as parts of the energy.
+/// One photon through a slab of water, in double precision. Angles come by rejection from a uniform cosine, and each collision absorbs or scatters
+/// the photon as a whole. Returns the energy that leaves before and behind the slab, as parts of the whole.
 fn photon(random: &mut Random, water: &Attenuation, kev: f64, depth_mm: f64) -> [f64; 2] {
     let (mut z, mut w, mut energy) = (0.0, 1.0, kev);
     loop {

@@ -1,6 +1,6 @@
-//! The same physics written anew: plain photons in double precision, other random numbers, walls found by marching voxels.
+//! The same physics written anew: analogue photons in double precision, other random numbers, and walls that are found by marching voxels.
 
-/// SplitMix64 (Steele, Lea, Flood, OOPSLA 2014): nothing in common with the kernel's generator.
+/// SplitMix64 (Steele, Lea, Flood, OOPSLA 2014). It has nothing in common with the kernel's generator.
 pub struct Random(pub u64);
 
 impl Random {
@@ -19,7 +19,7 @@ impl Random {
     }
 }
 
-/// What became of one photon's weight: six faces (−x, +x, −y, …), absorbed.
+/// The outcome of one photon's weight: six faces (−x, +x, −y, …), absorbed.
 pub fn photon(
     random: &mut Random,
     density: &dyn Fn([usize; 3]) -> f64,

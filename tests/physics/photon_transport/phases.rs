@@ -1,7 +1,7 @@
-//! Phase functions: what the sampler does against the density, by chi² over angles.
+//! Phase functions: the sampler against the density, by chi² over angles.
 //!
-//! In a slab whose albedo is 1e-4 all light that leaves has been scattered once, so the angles of what leaves are the phase function
-//! times a factor in closed form.
+//! In a slab with an albedo of 1e-4 all light that leaves has been scattered once. So the angles of that light follow the phase function times a
+//! factor in closed form.
 
 use serde_json::{Value, json};
 
@@ -10,8 +10,7 @@ use super::run::{chi_squared_excess, simulate};
 const TAU: f64 = 0.7;
 const ALBEDO: f64 = 1e-4;
 
-/// What of a unit of light leaves a slab of optical thickness TAU per unit of cosine, scattered once: for light that comes back
-/// (mu < 0) and goes through.
+/// The part of a unit of light that leaves a slab of optical thickness TAU per unit of cosine, scattered once: back (mu < 0) or through.
 fn once(density: &dyn Fn(f64) -> f64, mu: f64) -> f64 {
     let m = mu.abs();
     let factor = if mu < 0.0 {
@@ -19,7 +18,7 @@ fn once(density: &dyn Fn(f64) -> f64, mu: f64) -> f64 {
     } else if (1.0 - m).abs() < 1e-7 {
         TAU * (-TAU).exp()
     } else {
-        // exp(-tau) - exp(-tau / m), without losing digits
+        // This is exp(-tau) - exp(-tau / m), without loss of digits.
         m / (1.0 - m) * (-TAU).exp() * -(-TAU * (1.0 - m) / m).exp_m1()
     };
     ALBEDO * 2.0 * std::f64::consts::PI * density(mu) * factor
@@ -50,7 +49,7 @@ fn check(name: &str, phase: &Value, density: &dyn Fn(f64) -> f64) {
                 0.0
             };
             let got = result["exit_histogram"][side][0][cone]["value"].as_f64().unwrap() - unscattered;
-            // In angle, where the density is smooth.
+            // The integral is over the angle, since the density is smooth there.
             let by_angle = |t: f64| once(density, sign * t.cos()) * t.sin();
             let truth = integral(&by_angle, ends[0].to_radians(), ends[1].to_radians());
             let (expected, counted) = (truth * photons / ALBEDO, got * photons / ALBEDO);
@@ -89,7 +88,7 @@ fn two_lobes_rayleigh_and_a_table() {
     });
     let rayleigh = |mu: f64| 3.0 / (16.0 * std::f64::consts::PI) * (1.0 + mu * mu);
     check("Rayleigh", &json!({"type": "rayleigh"}), &rayleigh);
-    // A table with a zero, a jump and a steep peak, normalised here anew.
+    // The table has a zero, a jump and a steep peak, and is normalised here anew.
     let points = [(-1.0, 3.0), (-0.5, 0.0), (0.0, 0.2), (0.001, 2.0), (0.6, 1.0), (0.9, 1.0), (1.0, 9.0)];
     let area: f64 = points.windows(2).map(|w| 0.5 * (w[0].1 + w[1].1) * (w[1].0 - w[0].0)).sum();
     let table = |mu: f64| {
@@ -102,8 +101,8 @@ fn two_lobes_rayleigh_and_a_table() {
 
 #[test]
 fn the_gather_sees_the_density_that_is_sampled() {
-    // Light straight down a thin beam, seen from a place so far away that all directions to it are one: each collision is scored with
-    // the phase function's density at that angle.
+    // Light goes straight down a thin beam and is seen from so far away that all directions to the eye are one. Each collision is scored with the
+    // phase function's density at that angle.
     for (phase, density) in [
         (json!({"type": "henyey_greenstein", "g": 0.6}), Box::new(lobe(0.6)) as Box<dyn Fn(f64) -> f64>),
         (
@@ -123,7 +122,7 @@ fn the_gather_sees_the_density_that_is_sampled() {
             let scene = json!({"photons": 200_000, "size_mm": [1, 1, 1], "grid": [1, 1, 1], "medium": medium, "tally": "radiance_gather", "eye_mm": eye});
             let job = crate::common::engine::House::shared().finish(&super::run::request(&scene));
             let got = job.field().unwrap().value(0, 0, 0);
-            // (1 / sigma) sum of w P / dV, and 1 - exp(-2) collide.
+            // The truth is (1 / sigma) times the sum of w P / dV, and 1 - exp(-2) of the light collides.
             let truth = (1.0 - (-2f64).exp()) / 2.0 * density(cosine);
             assert!((got / truth - 1.0).abs() < 0.006, "{phase} at {cosine}: {got} for {truth}");
         }

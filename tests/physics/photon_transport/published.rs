@@ -1,4 +1,4 @@
-//! Totals that others published: VALIDATION's P1 to P9.
+//! Published totals: VALIDATION's P1 to P9.
 
 use serde_json::{Value, json};
 
@@ -17,7 +17,7 @@ pub fn slab() -> Value {
 #[test]
 fn the_slab_of_van_de_hulst_by_every_unbiased_tracker() {
     for tracking in ["exact", "delta", "weighted"] {
-        // A majorant above the extinction, so that delta tracking has null collisions to get wrong.
+        // The majorant is above the extinction, so that delta tracking has null collisions.
         let scene = with(&slab(), &json!({"tracking": tracking, "majorant": {"scale": 1.7}, "tally": "absorbed"}));
         judge(&format!("{tracking}: diffuse reflectance"), &scene, 0.0973946, 1e-7, ledger("exit_minus_z"));
         judge(&format!("{tracking}: total transmittance"), &scene, 0.6609577, 1e-7, ledger("exit_plus_z"));
@@ -45,8 +45,8 @@ fn the_cubes_of_mcx() {
     let bent = json!({"boundary": {"fresnel": true, "specular_entry": false}});
     judge("cube60", &cube60(), 0.1766, 3e-4, ledger("absorbed"));
     judge("cube60b", &with(&cube60(), &bent), 0.2725, 3e-4, ledger("absorbed"));
-    // MCX's own request: a 40 mm square that starts 10 mm before the face. The table's 25.60 % is three of its standard errors above
-    // what a hundred million of our photons say, 25.508 %; three runs of pmcxcl 0.7.5 of 400,000 gave 25.49, 25.46 and 25.53 %.
+    // The source is that of MCX's own request: a 40 mm square that starts 10 mm before the face. The table's 25.60 % is three of its standard
+    // errors above our 25.508 % from a hundred million photons. Three runs of pmcxcl 0.7.5 with 400,000 photons gave 25.49, 25.46 and 25.53 %.
     let planar = json!({"source": {"type": "planar", "position_mm": [10, 10, -10], "edge_u_mm": [40, 0, 0], "edge_v_mm": [0, 40, 0]}});
     judge("cube60planar", &with(&with(&cube60(), &bent), &planar), 0.2560, 3e-4, ledger("absorbed"));
     let inside = json!({"photons": 20_000, "source": {"type": "isotropic", "position_mm": [29, 29, 29]}});
@@ -66,7 +66,7 @@ fn the_half_spaces_of_chandrasekhar() {
 
 #[test]
 fn a_medium_of_one_dimension() {
-    // A photon that goes on or turns back: the two lobes' limits.
+    // The photon goes on or turns back, as in the two lobes' limits.
     let phase = json!({"type": "two_term_henyey_greenstein", "g1": 1, "g2": -1, "weight": 0.9});
     let scene = json!({"photons": 50_000, "grid": [1, 1, 10],
         "layers": [{"thickness_mm": 10, "mu_a_per_mm": 0.01, "mu_s_per_mm": 0.99, "index": 1, "phase": phase}]});

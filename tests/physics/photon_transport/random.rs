@@ -1,5 +1,4 @@
-//! The random numbers: that they are Philox's, that neighbours have nothing to do with each other, and what the lecture's generator
-//! does wrong.
+//! The random numbers: they are Philox's, neighbours are independent, and the lecture's generator has known faults.
 
 use serde_json::json;
 
@@ -19,7 +18,7 @@ fn unit(bits: u32) -> f64 {
     (f64::from(bits >> 9) + 0.5) / f64::from(1 << 23)
 }
 
-/// What the kernel draws for a photon's event.
+/// The kernel's random numbers for a photon's event.
 fn draw(seed: u64, photon: u64, event: u32) -> [f64; 4] {
     philox([photon as u32, (photon >> 32) as u32, event, 0x7068_6f74], [seed as u32, (seed >> 32) as u32]).map(unit)
 }
@@ -35,7 +34,7 @@ fn the_generator_has_the_published_answers() {
 
 #[test]
 fn the_kernel_draws_these_numbers() {
-    // One photon in a medium that only absorbs: its path is -ln u of the third number of its first event.
+    // One photon in a medium that only absorbs has the path -ln u of the third number of its first event.
     let layers = json!([{"thickness_mm": 100, "mu_a_per_mm": 1, "mu_s_per_mm": 0, "index": 1}]);
     let scene = json!({"photons": 1, "grid": [1, 1, 1], "layers": layers});
     for seed in [0, 1, 2, 12345, 1 << 40, (1 << 53) - 1] {
@@ -43,18 +42,18 @@ fn the_kernel_draws_these_numbers() {
         let truth = -draw(seed, 0, 0)[2].ln();
         assert!((path - truth).abs() < 1e-3, "seed {seed}: {path} for {truth}");
     }
-    // Several photons: the sum of theirs.
+    // For several photons, the path is the mean of theirs.
     let path = simulate(&with(&scene, &json!({"photons": 1000, "seed": 9})))["mean_path_mm"].as_f64().unwrap();
     let truth = (0..1000).map(|photon| -draw(9, photon, 0)[2].ln()).sum::<f64>() / 1000.0;
     assert!((path - truth).abs() < 1e-3, "{path} for {truth}");
 }
 
-/// Correlation of two streams of `n` numbers, in standard deviations of none.
+/// The correlation of two streams of `n` numbers, in standard deviations of uncorrelated ones.
 fn correlation(n: usize, a: impl Fn(usize) -> f64, b: impl Fn(usize) -> f64) -> f64 {
     12.0 * (0..n).map(|i| (a(i) - 0.5) * (b(i) - 0.5)).sum::<f64>() / (n as f64).sqrt()
 }
 
-/// Chi squared of pairs on a grid of 32 by 32, in standard deviations above its mean.
+/// The chi squared of pairs on a grid of 32 by 32, in standard deviations above its mean.
 fn pairs(n: usize, a: impl Fn(usize) -> f64, b: impl Fn(usize) -> f64) -> f64 {
     let mut counts = vec![0f64; 1024];
     (0..n).for_each(|i| counts[(a(i) * 32.0) as usize * 32 + (b(i) * 32.0) as usize] += 1.0);
@@ -96,7 +95,7 @@ fn adjacent_seeds_photons_events_and_dimensions_are_independent() {
             );
         }
     }
-    // Seeds in a row for one photon: the first numbers of a study's repeats.
+    // Consecutive seeds for one photon: the first numbers of a study's repeats.
     let r = correlation(n, |i| draw(at(i), 0, 0)[2], |i| draw(at(i) + 1, 0, 0)[2]);
     assert!(r.abs() < 4.5, "seeds in a row: {r:.1} deviations");
 }
@@ -111,7 +110,7 @@ fn no_number_is_0_or_1() {
 struct Tausworthe([u32; 4]);
 
 impl Tausworthe {
-    /// As the lecture seeds it: all components with the same small number.
+    /// The generator with the lecture's seed: all components have the same small number.
     fn new(seed: u32) -> Self {
         Self([seed; 4])
     }
@@ -132,8 +131,7 @@ impl Tausworthe {
 
 #[test]
 fn the_lectures_generator_shows_its_faults() {
-    // Seeds below the masks' lowest bits lose components for ever: what is left is the linear congruential one alone, whose lowest
-    // bit alternates.
+    // Seeds below the masks' lowest bits lose components for ever. The linear congruential one alone is left, whose lowest bit alternates.
     for seed in [1, 7] {
         let mut generator = Tausworthe::new(seed);
         let zero = (0..100).fold([true; 3], |zero, _| {

@@ -1,4 +1,4 @@
-//! Running simulations and judging them.
+//! Simulations, and their statistical tests.
 
 use serde_json::{Value, json};
 
@@ -27,13 +27,13 @@ pub fn fraction(result: &Value, name: &str) -> (f64, f64) {
     )
 }
 
-/// Mean and standard error, from the spread of twenty seeds, of a value of the result.
+/// The mean and the standard error, from the spread of twenty seeds, of a value of the result.
 pub fn over_seeds(parameters: &Value, value: impl Fn(&Value) -> f64) -> (f64, f64) {
     let runs: Vec<f64> = (0..20).map(|seed| value(&simulate(&with(parameters, &json!({"seed": seed}))))).collect();
     spread(&runs)
 }
 
-/// Mean and standard error of runs.
+/// The mean and the standard error of runs.
 pub fn spread(runs: &[f64]) -> (f64, f64) {
     let n = runs.len() as f64;
     let mean = runs.iter().sum::<f64>() / n;
@@ -48,7 +48,7 @@ pub fn judge(what: &str, parameters: &Value, truth: f64, within: f64, value: imp
     assert!(z.abs() <= 3.5, "{what}: {mean} ± {error} for {truth} ± {within}, z = {z:.2}");
 }
 
-/// How many standard deviations a sum of squared z values of `count` bins is above what chance gives.
+/// The excess of a sum of squared z values of `count` bins above chance, in standard deviations.
 pub fn chi_squared_excess(z: impl Iterator<Item = f64>) -> (f64, usize) {
     let (sum, count) = z.fold((0.0, 0usize), |(sum, n), z| (sum + z * z, n + 1));
     // Wilson & Hilferty (1931): the cube root of chi²/n is nearly normal.

@@ -1,11 +1,11 @@
-//! The same bytes whatever runs them.
+//! The same bytes on any number of threads and servers.
 
 use serde_json::{Value, json};
 
 use super::run::request;
 use crate::common::Server;
 
-/// The grid and the ledger as a server gives them.
+/// The grid and the ledger of a server.
 fn grid(server: &Server, parameters: &Value) -> (Vec<u8>, Value) {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
     let client = reqwest::Client::builder().no_proxy().build().unwrap();
@@ -28,7 +28,7 @@ fn any_number_of_threads_gives_the_same_bytes() {
         json!({"mu_a_per_mm": 0.1, "mu_s_per_mm": 1.5, "index": 1.4, "phase": {"type": "henyey_greenstein", "g": 0.8}});
     for parameters in [
         json!({"photons": 60_000, "medium": medium, "size_mm": [10, 10, 10], "grid": [20, 20, 20], "boundary": {"fresnel": true}}),
-        // So many voxels that all cores share one grid.
+        // The grid has so many voxels that all cores share one grid.
         json!({"photons": 20_000, "density": {"builtin": "gaussian", "resolution": 240}, "medium": medium, "tally": "absorbed"}),
     ] {
         let (grid_one, ledger_one) = grid(&one, &parameters);

@@ -1,4 +1,4 @@
-//! Trackers and estimators against each other and against what theory says of their bias.
+//! Trackers and estimators against each other and against the theory of their bias.
 
 use serde_json::{Value, json};
 
@@ -6,7 +6,7 @@ use super::published::slab;
 use super::run::{chi_squared_excess, fraction, judge, request, simulate, spread, with};
 use crate::common::engine::House;
 
-/// A medium that only absorbs, 1 per mm, so deep that nothing gets through: the mean path is the mean free path.
+/// A medium that only absorbs, 1 per mm, and that is so deep that nothing gets through. The mean path is the mean free path.
 fn free_paths(tracking: &str, more: &Value) -> Value {
     let layers = json!([{"thickness_mm": 60, "mu_a_per_mm": 1, "mu_s_per_mm": 0, "index": 1}]);
     with(&json!({"photons": 100_000, "grid": [1, 1, 1], "layers": layers, "tracking": tracking}), more)
@@ -40,14 +40,14 @@ fn a_majorant_that_is_too_small_biases_delta_tracking_and_says_so() {
         let codes: Vec<&Value> = result["warnings"].as_array().unwrap().iter().map(|w| &w["code"]).collect();
         assert_eq!(broken > 0, scale < 1.0, "{scale}: {broken} broken majorants");
         assert_eq!(codes.contains(&&json!("broken_majorant")), scale < 1.0, "{scale}: {codes:?}");
-        // Weights make up for it.
+        // The weights compensate for it.
         judge(&format!("weighted, {scale}"), &free_paths("weighted", &more), (-2f64).exp(), 1e-7, |r| {
             fraction(r, "exit_plus_z").0
         });
     }
 }
 
-/// Names of the ledger whose sum is all.
+/// The names of the ledger whose sum is 1.
 pub const LEDGER: [&str; 10] = [
     "exit_minus_x",
     "exit_plus_x",
@@ -61,7 +61,7 @@ pub const LEDGER: [&str; 10] = [
     "gated",
 ];
 
-/// A ledger against another, both with their standard errors.
+/// Compares two ledgers, both with their standard errors.
 fn same_ledger(what: &str, a: &Value, b: &Value) {
     for name in &LEDGER[..7] {
         let ((va, ea), (vb, eb)) = (fraction(a, name), fraction(b, name));
@@ -146,7 +146,7 @@ fn how_far_around_a_medium_is_the_same_changes_no_path() {
                 .map(|estimator| simulate(&with(&scene, &json!({"tally": "absorbed", "estimator": estimator}))));
             for name in LEDGER {
                 let (a, b) = (fraction(&near, name).0, fraction(&far, name).0);
-                // A few paths in 100,000 part where rounding decides.
+                // A few paths in 100,000 differ because of rounding.
                 assert!((a - b).abs() < 1e-4, "{indices:?}, {ends}: {name} is {a} voxel by voxel, else {b}");
             }
             for name in ["mean_scatterings", "mean_path_mm"] {
@@ -173,7 +173,7 @@ fn what_leaves_the_slab_leaves_alike_for_every_tracker() {
                 for cone in 0..6 {
                     let at = |h: &Value, what: &str| h[side][ring][cone][what].as_f64().unwrap();
                     let error = at(&exact, "standard_error").hypot(at(&other, "standard_error"));
-                    // Bins with enough photons for their error to be known.
+                    // Only bins are used that have enough photons for their error to be known.
                     if at(&exact, "value") > 2e-5 {
                         z.push((at(&exact, "value") - at(&other, "value")) / error);
                     }
@@ -182,7 +182,7 @@ fn what_leaves_the_slab_leaves_alike_for_every_tracker() {
         }
         let (excess, count) = chi_squared_excess(z.into_iter());
         assert!(count > 60, "only {count} bins");
-        // The errors come from 32 batches: a t distribution's square is a little wider, by 31 / 29.
+        // The errors come from 32 batches. The square of a t distribution is a little wider, by 31 / 29.
         assert!(excess < 4.5, "exact and {tracking}: chi² over {count} bins is {excess:.1} deviations too large");
     }
 }
@@ -198,13 +198,13 @@ fn first_collisions_follow_the_exponential_law() {
         let z = (0..24).map(|i| {
             let (from, to) = (1.5 * f64::from(i) / 8.0, 1.5 * f64::from(i + 1) / 8.0);
             let expected = photons * ((-from).exp() - (-to).exp());
-            // Weighted tracking's weights spread more than counts do, so the spread of the seeds tells the error.
+            // The weights of weighted tracking spread more than counts do, so the spread of the seeds gives the error.
             let counts = runs.iter().map(|r| r.value(0, 0, i as usize) * photons * 60.0 * 60.0 * 0.125);
             let (mean, error) = spread(&counts.collect::<Vec<_>>());
             (mean - expected) / error
         });
         let (excess, _) = chi_squared_excess(z);
-        // The errors come from 20 seeds: a t distribution's square is wider, by 19 / 17.
+        // The errors come from 20 seeds. The square of a t distribution is wider, by 19 / 17.
         assert!(excess < 4.5, "{tracking}: chi² is {excess:.1} deviations too large");
     }
 }
@@ -231,7 +231,7 @@ fn both_estimators_give_the_same_fluence_at_every_depth() {
             (a - b) / ea.hypot(eb)
         });
         let (excess, _) = chi_squared_excess(z);
-        // Errors from eight runs each, and depths that share photons.
+        // The errors come from eight runs each, and depths share photons.
         assert!(excess < 6.0, "{tally}: chi² is {excess:.1} deviations too large");
     }
 }

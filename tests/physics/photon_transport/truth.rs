@@ -22,7 +22,7 @@ fn fraction(result: &Value, name: &str) -> (f64, f64) {
     (entry["value"].as_f64().unwrap(), entry["standard_error"].as_f64().unwrap())
 }
 
-/// Mean and standard error of a value over seeds.
+/// The mean and the standard error of a value over seeds.
 fn over_seeds(seeds: u64, value: impl Fn(u64) -> f64) -> (f64, f64) {
     let values: Vec<f64> = (0..seeds).map(value).collect();
     let mean = values.iter().sum::<f64>() / seeds as f64;
@@ -51,7 +51,7 @@ fn the_energy_ledger_closes() {
 
 #[test]
 fn in_a_vacuum_each_face_sees_its_solid_angle() {
-    // From the centre a sixth each; z over twenty seeds.
+    // From the centre, a sixth goes to each face. z is over twenty seeds.
     for (i, face) in FRACTIONS[..6].iter().enumerate() {
         let run = |seed: u64| {
             let parameters = json!({"photons": 20_000, "extinction_scale": 0, "grid": [16, 16, 16], "seed": seed + 100 * i as u64,
@@ -116,7 +116,7 @@ fn a_point_light_in_a_vacuum_falls_with_the_square_of_the_distance() {
             truth += 1.0 / (4.0 * std::f64::consts::PI * r2) / (m * m * m) as f64;
         }
         let got = field.value(voxel[0], voxel[1], voxel[2]);
-        // Photons that cross the voxel: two million times its solid angle; a track has a spread of about a half.
+        // The number of photons that cross the voxel is two million times its solid angle. A track has a spread of about a half.
         let crossing = 2e6 * truth / 400.0;
         let z = (got / truth - 1.0) / (1.2 / crossing.sqrt());
         assert!(z.abs() <= 3.5, "{voxel:?}: {got} for {truth}, z = {z}");
@@ -160,7 +160,7 @@ fn lanes_and_repeats_change_nothing() {
     let narrow = simulate(House::of_lanes(1), &parameters);
     for name in FRACTIONS {
         let difference = (fraction(&wide, name).0 - fraction(&narrow, name).0).abs();
-        // The same photons; a few meet a wall or a collision the other way by a last bit.
+        // The photons are the same. A few meet a wall or a collision differently because of a last bit.
         assert!(
             difference < 2e-4,
             "{name}: {} with 16 lanes, {} with 1",

@@ -37,7 +37,7 @@ fn skipping_changes_nothing() {
                     house.film(&request(&volume, parameters)).0
                 };
                 for step in [1.0, 5.0] {
-                    // Bytes are interpolated in integers, which may pass a cell's range by 2^-7 of a grey level.
+                    // Bytes are interpolated in integers, which may exceed a cell's range by 2^-7 of a grey level.
                     let difference = worst(&film(true, step), &film(false, step));
                     assert!(difference < 1.0 / 128.0 / 255.0, "{volume} {mode} {interpolation}: {difference:e}");
                 }

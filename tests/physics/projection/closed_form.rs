@@ -9,7 +9,7 @@ use crate::emission_absorption::oracle::{Eye, inside};
 
 const AXES: DVec3 = dvec3(0.8, 0.55, 0.65);
 
-/// Where a ray is in the ellipsoid, and c of |p/axes|² = c (t − t₁)(t − t₂) + 1 along it.
+/// The part of a ray inside the ellipsoid, and c of |p/axes|² = c (t − t₁)(t − t₂) + 1 along it.
 fn chord(eye: DVec3, d: DVec3) -> Option<(f64, f64)> {
     let (o, d) = (eye / AXES, d / AXES);
     let (a, b, c) = (d.dot(d), o.dot(d), o.dot(o) - 1.0);
@@ -17,7 +17,7 @@ fn chord(eye: DVec3, d: DVec3) -> Option<(f64, f64)> {
     (root > 0.0).then(|| (2.0 * root.sqrt() / a, a))
 }
 
-/// Mean error over the rays of ∫ v ds of a phantom that is sampled at n³ voxels.
+/// The mean error over the rays of ∫ v ds of a phantom that is sampled at n³ voxels.
 fn error_at(n: usize, value: impl Fn(DVec3) -> f64, truth: impl Fn(DVec3, DVec3) -> f64) -> f64 {
     let house = House::shared();
     let volume = house.floats([n; 3], |x, y, z| value(dvec3(x, y, z)));
@@ -33,7 +33,7 @@ fn order(errors: &[f64]) -> f64 {
 
 #[test]
 fn an_ellipsoids_projection_is_its_chord() {
-    // Voxels in or out: the edge is off by up to half a voxel, either way, so the chord converges with first order.
+    // Voxels are inside or outside. The edge is off by up to half a voxel, either way, so the chord converges with first order.
     let solid = |p: DVec3| if (p / AXES).length_squared() < 1.0 { 1.0 } else { 0.0 };
     let length = |eye: DVec3, d: DVec3| chord(eye, d).map_or(0.0, |(length, _)| length);
     let errors = [16, 32, 64, 128].map(|n| error_at(n, solid, length));
@@ -43,7 +43,7 @@ fn an_ellipsoids_projection_is_its_chord() {
 
 #[test]
 fn a_smooth_ellipsoids_projection_converges_with_second_order() {
-    // 1 − q² within q < 1: −c (t − t₁)(t − t₂) along the chord, whose integral is c L³ / 6.
+    // 1 − q² within q < 1 is −c (t − t₁)(t − t₂) along the chord, whose integral is c L³ / 6.
     let smooth = |p: DVec3| (1.0 - (p / AXES).length_squared()).max(0.0);
     let truth = |eye: DVec3, d: DVec3| chord(eye, d).map_or(0.0, |(length, c)| c * length.powi(3) / 6.0);
     let errors = [16, 32, 64, 128].map(|n| error_at(n, smooth, truth));
@@ -101,7 +101,7 @@ fn all_modes_of_a_constant_are_the_constant() {
     }
 }
 
-/// ∫ clamp(u(t), −e, e) dt where u goes evenly from a to b over the length.
+/// ∫ clamp(u(t), −e, e) dt, with u going evenly from a to b over the length.
 fn clamped_ramp(a: f64, b: f64, e: f64, length: f64) -> f64 {
     let integral = |u: f64| match u {
         u if u < -e => -e * u - 0.5 * e * e,
@@ -127,7 +127,7 @@ fn a_ramp_and_its_clamped_border_integrate_in_closed_form() {
             assert!((got[pixel].0 - truth).abs() < 1e-4, "{:?} {pixel}: {} for {truth}", eye.eye, got[pixel].0);
         }
     }
-    // The same by the reference of the other tests, which is checked by this.
+    // The reference of the other tests must give the same, and is checked by this.
     let centre = |i: usize, n: usize| (i as f64 + 0.5) / n as f64 * 2.0 - 1.0;
     let at = |i: usize| dvec3(centre(i % 6, 6), centre(i / 6 % 11, 11), centre(i / 66, 4));
     let grid = Grid { dims, voxels: (0..6 * 11 * 4).map(|i| (2.0 + slope.dot(at(i))) as f32).collect() };

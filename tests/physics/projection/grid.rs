@@ -1,4 +1,4 @@
-//! What lies along a ray through a grid on [−1, 1]³, in double precision and written anew from the definitions.
+//! The values along a ray through a grid on [−1, 1]³, in double precision and written anew from the definitions.
 
 use glam::{DVec3, dvec3};
 use serde_json::{Value, json};
@@ -39,7 +39,7 @@ impl Grid {
         f64::from(self.voxels[i[0] + self.dims[0] * (i[1] + self.dims[1] * i[2])])
     }
 
-    /// The interpolant at a point: sums of voxels times weights along each axis; a NaN among them makes it NaN.
+    /// The interpolant at a point: sums of voxels times weights along each axis. A NaN among them makes it NaN.
     pub fn value(&self, p: DVec3, interpolation: &str) -> f64 {
         let u = (p + 1.0) * 0.5 * dvec3(self.dims[0] as f64, self.dims[1] as f64, self.dims[2] as f64);
         if interpolation == "nearest" {
@@ -64,7 +64,7 @@ impl Grid {
         sum
     }
 
-    /// Where a ray meets the planes at which the interpolant changes its polynomial, with its ends.
+    /// The places along a ray at which the interpolant changes its polynomial, with the ray's ends.
     fn stretches(&self, eye: DVec3, d: DVec3, interpolation: &str) -> Vec<f64> {
         let Some((near, far)) = inside(eye, d, DVec3::ONE) else { return Vec::new() };
         let shift = if interpolation == "nearest" { 0.0 } else { 0.5 };
@@ -82,7 +82,7 @@ impl Grid {
         t
     }
 
-    /// ∫ v ds and the length over which there is a value: many points of Gauss's rule in every stretch.
+    /// ∫ v ds and the length that has a value, by many points of Gauss's rule in every stretch.
     pub fn integral(&self, eye: DVec3, d: DVec3, interpolation: &str) -> (f64, f64) {
         let (mut sum, mut length) = (0.0, 0.0);
         for pair in self.stretches(eye, d, interpolation).windows(2) {
@@ -131,13 +131,13 @@ fn catmull_rom(x: f64) -> f64 {
     }
 }
 
-/// Eyes at odd angles, along an axis, and inside; none on a face between voxels, where `nearest` is either of them.
+/// Eyes at odd angles, along an axis, and inside. None is on a face between voxels, where `nearest` could be either of them.
 pub fn eyes() -> Vec<Eye> {
     let outside = [[2.1, 1.7, 2.3], [0.0, 0.0, 3.0], [-3.0, 0.4, 0.2], [0.1, 0.23, -0.3]];
     outside.into_iter().map(|at| Eye::at(at, 42.0)).collect()
 }
 
-/// The numbers of a request's film and what is not transparent, one sample through the pixels' centres.
+/// The numbers of a request's film, and true if the pixel is not transparent, for one sample through the pixels' centres.
 pub fn numbers(house: &House, volume: &Value, eye: &Eye, parameters: &Value) -> Vec<(f64, bool)> {
     let mut request = json!({
         "technique": "projection", "volume": volume, "camera": eye.json(), "image": {"width": SIDE, "height": SIDE},
@@ -149,7 +149,7 @@ pub fn numbers(house: &House, volume: &Value, eye: &Eye, parameters: &Value) -> 
     film.main.mean.chunks_exact(4).map(|p| (f64::from(p[0]), p[3] > 0.5)).collect()
 }
 
-/// The rays of those numbers, where they are longer in the box than a graze, which has few digits in single precision.
+/// The rays of those numbers that do not only graze the box. A graze has few digits in single precision.
 pub fn rays(eye: &Eye) -> impl Iterator<Item = (usize, DVec3, f64)> {
     let eye = *eye;
     (0..SIDE * SIDE).filter_map(move |pixel| {

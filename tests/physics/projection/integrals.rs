@@ -22,7 +22,7 @@ fn check(grid: &Grid, interpolation: &str) {
             assert!((sum[pixel].0 - truth).abs() < 1e-4, "{said}: sum {} for {truth}", sum[pixel].0);
             let through = (-sigma * (truth - 0.1 * length)).exp();
             assert!((xray[pixel].0 - through).abs() < 1e-4, "{said}: X-ray {} for {through}", xray[pixel].0);
-            // A stretch so short that it has few digits says nothing of its mean.
+            // The mean over a very short stretch has few digits and is not tested.
             if length > 0.05 {
                 assert!(
                     (mean[pixel].0 - truth / length).abs() < 1e-4,
@@ -101,7 +101,7 @@ fn the_step_plays_no_part() {
                 "budget": {"samples": samples}, "projection": {"mode": mode, "output": "value"}
             })
         };
-        // With one sample, the whole difference to the control at twice the step.
+        // With one sample, the error would be the whole difference to the control at twice the step.
         let (_, error) = house.film(&request(1));
         assert_eq!(error.total, 0.0, "{mode}");
         let (_, error) = house.film(&request(16));

@@ -1,4 +1,4 @@
-//! Greatest and least value: exact against a fine scan, and on steps with second order.
+//! The greatest and the least value: exact against a fine scan, and on steps with second order.
 
 use serde_json::json;
 
@@ -19,7 +19,7 @@ fn check(grid: &Grid, interpolation: &str) {
             let truth = grid.greatest(eye.eye, d, interpolation);
             let said = format!("{:?} {interpolation}, eye {:?}, pixel {pixel}", grid.dims, eye.eye);
             assert_eq!(greatest[pixel].1, truth.is_some(), "{said}");
-            // The scan of 200 points a stretch may miss the top by a little; never may the device be above it by more than that.
+            // The scan of 200 points a stretch may miss the top by a little. The device may never be above it by more than that.
             let truth = truth.unwrap_or(0.0);
             assert!((greatest[pixel].0 - truth).abs() < 1e-4, "{said}: {} for {truth}", greatest[pixel].0);
             assert!((least[pixel].0 + truth).abs() < 1e-4, "{said}: {} for {}", least[pixel].0, -truth);
@@ -37,7 +37,7 @@ fn exact_ones_are_the_interpolants() {
 
 #[test]
 fn nearest_ones_are_the_voxels() {
-    // A corner that a ray grazes for a millionth of its length may be seen or not: smooth voxels make that harmless.
+    // A corner that a ray grazes for a millionth of its length may be seen or not. Smooth voxels make that harmless.
     let smooth =
         |i: usize| ((i % 7) as f32 * 0.9).sin() * 1e-3 + 0.5 * ((i / 7 % 5) as f32 * 0.01) + 1e-4 * (i / 35) as f32;
     check(&Grid { dims: [7, 5, 9], voxels: (0..315).map(smooth).collect() }, "nearest");
@@ -55,8 +55,8 @@ fn holes_are_passed_over() {
 
 #[test]
 fn on_steps_it_converges_with_second_order_from_below() {
-    // A sheet many voxels thick, so that the interpolant looks smooth to the step, and aslant, so that its crest is met at
-    // another part of a step by every ray.
+    // The sheet is many voxels thick, so that the interpolant looks smooth to the step. It is aslant, so that each ray meets its crest at another
+    // part of a step.
     let house = House::shared();
     let sheet = |x: f64, y: f64, _: f64| (-4.0 * (0.958 * x + 0.287 * y).powi(2)).exp();
     let volume = house.floats([96; 3], sheet);
@@ -95,7 +95,7 @@ fn the_stated_error_covers_the_real_one() {
         let ((truth, _), (film, error)) = (film(true), film(false));
         let real = truth.difference(&film).unwrap();
         println!("{volume}: real {real}, stated {error:?}");
-        // Both films went through the same places of the pixels: the difference is the step's alone.
+        // Both films went through the same places of the pixels, so the difference is the step's alone.
         assert!(error.total > 0.7 * real, "{volume}: says {error:?}, is {real}");
     }
 }

@@ -1,4 +1,4 @@
-//! Window, level and colour maps; what is refused; the manual's example.
+//! Window, level and colour maps; refused requests; the manual's example.
 
 use cloudchamber::error::Error;
 use cloudchamber::technique::projection;
@@ -102,7 +102,7 @@ fn a_greatest_value_is_shown_from_words_and_written_from_floats() {
     };
     let [(words, shown), (no_words, values)] = [of(json!({})), of(json!({"output": "value"}))];
     assert!(words && !no_words);
-    // Grey is the value's part of the range in sRGB, and the film has linear light.
+    // Grey is the value's part of the range in sRGB. The film has linear light.
     let [low, high] = house.assets().volumes().get(volume["id"].as_str().unwrap()).unwrap().range();
     let pixels = shown.main.mean.chunks_exact(4).zip(values.main.mean.chunks_exact(4));
     for (grey, value) in pixels.filter(|(grey, _)| grey[3] == 1.0) {

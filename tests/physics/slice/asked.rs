@@ -1,4 +1,4 @@
-//! What a request may ask and may not; the same request twice; the manual's example.
+//! Permitted and refused requests; the same request twice; the manual's example.
 
 use cloudchamber::error::Error;
 use cloudchamber::technique::slice;
@@ -45,7 +45,7 @@ fn the_window_goes_from_the_first_colour_to_the_last() {
     let row: Vec<f32> = (0..SIDE).map(|i| film.main.mean[4 * (SIDE / 2 * SIDE + i)]).filter(|v| *v > 0.0).collect();
     assert!(row.windows(2).all(|p| p[1] >= p[0]), "{row:?}");
     assert_eq!(row[row.len() - 1], 1.0);
-    // Grey is even on the screen: the centre, an eighth of the window below its level, is 0.375 in sRGB.
+    // Grey is even on the screen. The centre, an eighth of the window below its level, is 0.375 in sRGB.
     let centre = film.main.mean[4 * (SIDE / 2 * SIDE + SIDE / 2)];
     assert!((centre - ((0.375f32 + 0.055) / 1.055).powf(2.4)).abs() < 1e-3, "{centre}");
 }

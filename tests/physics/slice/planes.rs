@@ -1,4 +1,4 @@
-//! A linear field is known everywhere: what a plane shows of it must be its value at the world points that the camera sees.
+//! A linear field is known everywhere, so a plane must show its value at the world points that the camera sees.
 
 use glam::{DMat3, DVec3, dvec3};
 use serde_json::{Value, json};
@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use crate::common::engine::House;
 
 pub const SIDE: usize = 33;
-/// World units that the picture is wide and high.
+/// The width and height of the picture, world units.
 pub const SPAN: f64 = 4.0;
 
 /// An orthographic camera at `eye` that looks at the origin.
@@ -28,7 +28,7 @@ impl Camera {
         json!({"eye": self.eye.to_array(), "up": self.up.to_array(), "fov_y_deg": fov_y_deg, "projection": "orthographic"})
     }
 
-    /// Where the ray of a pixel meets a plane.
+    /// The point at which a pixel's ray meets a plane.
     pub fn meets(&self, pixel: usize, point: DVec3, normal: DVec3) -> DVec3 {
         let place = |i: usize| ((i as f64 + 0.5) / SIDE as f64 - 0.5) * SPAN;
         let from = self.eye + self.right * place(pixel % SIDE) - self.up * place(pixel / SIDE);
@@ -37,7 +37,7 @@ impl Camera {
     }
 }
 
-/// The numbers of a request's film, and what is not transparent.
+/// The numbers of a request's film, and true if the pixel is not transparent.
 pub fn numbers(house: &House, volume: &Value, camera: &Value, parameters: &Value) -> Vec<(f64, bool)> {
     let mut request = json!({
         "technique": "slice", "volume": volume, "camera": camera, "image": {"width": SIDE, "height": SIDE},
@@ -78,7 +78,7 @@ fn oblique(axes: DMat3) -> Vec<u8> {
     bytes
 }
 
-/// How far inside the grid a world point is, in voxels from its nearest face.
+/// The depth of a world point inside the grid, in voxels from its nearest face.
 fn depth(axes: DMat3, p: DVec3) -> f64 {
     let half = dvec3(DIMS[0] as f64, DIMS[1] as f64, DIMS[2] as f64) * 0.5;
     let u = axes.inverse() * p;
@@ -109,7 +109,7 @@ fn a_linear_field_has_its_values_at_world_points_on_any_grid() {
                     if inside.abs() > 1e-3 {
                         assert_eq!(shown, inside > 0.0, "{eye}, {normal}, pixel {pixel}: {inside} voxels inside");
                     }
-                    // Near the faces, the voxels beyond which a spline needs are not there.
+                    // Near the faces, a spline lacks the voxels beyond them.
                     if inside > if interpolation == "trilinear" { 0.5 } else { 1.5 } {
                         let truth = 5.0 + GRADIENT.dot(p);
                         assert!(
@@ -141,7 +141,7 @@ fn nearest_is_the_voxel_that_the_point_is_in() {
     for (pixel, (got, shown)) in got.into_iter().enumerate() {
         let p = camera.meets(pixel, dvec3(0.0, 0.0, 0.3), DVec3::Z);
         assert_eq!(shown, p.x.abs() < 1.0 && p.y.abs() < 1.0);
-        // On a face between two voxels it is either of them.
+        // On a face between two voxels, the value may be either of theirs.
         let apart = |v: f64| ((v + 1.0) * 4.0 - ((v + 1.0) * 4.0).round()).abs() > 1e-3;
         if shown && apart(p.x) && apart(p.y) {
             assert!((got - value(snap(p.x), snap(p.y), snap(p.z))).abs() < 1e-4, "{p}: {got}");
@@ -158,7 +158,7 @@ fn every_way_to_say_a_plane_says_the_same() {
     let first = of(json!({"axis": "z", "fraction": 0.65}));
     assert_eq!(first, of(json!({"axis": "z", "position": 0.3})));
     assert_eq!(first, of(json!({"point": [5, -7, 0.3], "normal": [0, 0, 20]})));
-    // Without a word: through the centre, facing the camera.
+    // The default plane goes through the centre and faces the camera.
     assert_eq!(of(json!({})), of(json!({"axis": "z"})));
     let side = Camera::at(dvec3(5.0, 0.0, 0.0)).json();
     assert_eq!(

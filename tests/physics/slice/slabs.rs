@@ -23,7 +23,7 @@ fn a_slab_of_a_linear_field_in_closed_form() {
                     numbers(house, &volume, &camera.json(), &parameters).into_iter().enumerate()
                 {
                     let p = camera.meets(pixel, DVec3::ZERO, normal);
-                    // The whole of the slab is away from the box's faces, where the field is clamped.
+                    // Only points are tested whose whole slab is away from the box's faces, where the field is clamped.
                     if (p.abs() + normal.abs() * thickness / 2.0).max_element() < 0.93 {
                         let truth = 5.0 + gradient.dot(p) + more;
                         assert!(
@@ -44,7 +44,7 @@ fn what_is_outside_of_the_volume_does_not_count() {
     let house = House::shared();
     let volume = house.floats([8, 8, 8], |_, _, z| 2.0 + z);
     let camera = Camera::at(dvec3(0.0, 0.0, 5.0));
-    // From z = 0.5 to the face at 1; the field is 2 + z up to the last centre at 0.875.
+    // The slab goes from z = 0.5 to the face at 1. The field is 2 + z up to the last centre at 0.875.
     let parameters = |mode: &str| json!({"plane": {"axis": "z", "position": 0.9}, "thickness": 0.8, "mode": mode});
     let mean = 2.0 + ((0.875f64.powi(2) - 0.5f64.powi(2)) / 2.0 + 0.125 * 0.875) / 0.5;
     for (mode, truth) in [("mean", mean), ("maximum", 2.875), ("minimum", 2.5)] {
@@ -106,7 +106,7 @@ fn degenerate_grids_have_a_plane_too() {
                     &json!({"interpolation": interpolation, "thickness": thickness}),
                 );
                 let centre = got[got.len() / 2];
-                // The field is odd about the centre, and so is what lies between voxels.
+                // The field is odd about the centre, and so is the interpolant between voxels.
                 let tolerance = if interpolation == "nearest" { 1.0 } else { 1e-4 };
                 assert!(
                     centre.1 && (centre.0 - 3.0).abs() <= tolerance,

@@ -1,4 +1,4 @@
-//! Plans against truths: what is dropped, and what must not be.
+//! Plans against truths: permitted reductions, and forbidden ones.
 
 use cloudchamber::plan::{Considered, Plan};
 use cloudchamber::study::bench::{Bench, Reads};
@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::on_a_bench;
 
-/// The first setting with many samples, and photons where it is of a field, and what is random in it.
+/// The truth: the first setting with many samples, and with many photons if its subject is a field; and the square of its random part.
 struct Truth {
     values: Vec<f64>,
     own_squared: f64,
@@ -25,12 +25,12 @@ impl Truth {
             bench.run(&reference, Reads::Luminance).unwrap().values
         });
         let values: Vec<f64> = a.iter().zip(&b).map(|(a, b)| 0.5 * (a + b)).collect();
-        // What is random in it is independent of the plan's: what two seeds of it differ by.
+        // The random part of the truth is independent of the plan's. The difference of two seeds tells it.
         let own_squared = a.iter().zip(&values).map(|(a, t)| (a - t).powi(2)).sum::<f64>() / values.len() as f64;
         Self { values, own_squared }
     }
 
-    /// What a picture is wrong by, relative.
+    /// The error of a picture, relative.
     fn error(&self, bench: &Bench, request: &Value) -> f64 {
         let found = bench.run(request, Reads::Luminance).unwrap().values;
         let mean = self.values.iter().sum::<f64>() / found.len() as f64;
@@ -62,10 +62,10 @@ fn what_is_small_thin_or_sharp_is_not_dropped() {
         peak.as_object_mut().unwrap().remove("emission_absorption");
         peak["medium"] =
             json!({"sigma_t_per_unit": 8, "albedo": 0.95, "phase": {"type": "henyey_greenstein", "g": 0.93}});
-        // The sun is behind the cloud: what comes through is the forward peak, scattered a few times.
+        // The sun is behind the cloud. The light that comes through is the forward peak, scattered a few times.
         peak["lights"] =
             json!([{"type": "sun", "direction": [-0.3, -0.4, -3], "irradiance": 3}, {"type": "sky", "radiance": 0.05}]);
-        // A lamp of a few pixels, seen past the cloud: hardly one of them is a pilot's.
+        // The lamp of a few pixels is seen past the cloud. Hardly one of its pixels is a pilot's.
         let mut lamp = looked_at(&json!({"builtin": "gaussian", "resolution": 32}), 0.05);
         lamp.as_object_mut().unwrap().remove("emission_absorption");
         lamp["medium"] = json!({"sigma_t_per_unit": 1, "albedo": 0.5});
@@ -90,7 +90,7 @@ fn voxels_finer_than_the_pixels_are_averaged_where_that_is_enough() {
             json!({"technique": "auto", "volume": volume, "image": {"width": 64, "height": 48}, "budget": {"max_error": error},
                 "camera": {"eye": [0.4, 0.5, 3.2], "up": [0, 1, 0], "fov_y_deg": 40}, "emission_absorption": {}})
         };
-        // Smooth: seen from so far half of its voxels a side do.
+        // The volume is smooth, and is seen from so far away that half of its voxels a side suffice.
         let smooth = looked_at(&json!({"builtin": "marschner_lobb", "resolution": 192}), 0.03);
         let found = plan(bench, &smooth);
         assert!(found.request["volume"]["level"].as_u64() > Some(0), "{}", found.request["volume"]);
@@ -99,7 +99,7 @@ fn voxels_finer_than_the_pixels_are_averaged_where_that_is_enough() {
         let level = |c: &&Considered| c.words.contains("of level 1");
         assert!(found.considered.iter().any(|c| level(&c) && c.bias > Some(0.0)), "its bias is measured");
 
-        // A shell of one voxel, opaque: what is left of it in a mean is another picture.
+        // The scene has an opaque shell of one voxel. A mean of its voxels would give another picture.
         let shell =
             |p: [f64; 3]| f64::from(u8::from((p.iter().map(|v| v * v).sum::<f64>().sqrt() - 0.7).abs() < 0.006));
         let mut thin = looked_at(&bench.floats([176; 3], [2.0; 3], shell).unwrap(), 0.05);
@@ -130,7 +130,7 @@ fn a_field_gets_the_photons_that_its_picture_needs_and_no_more() {
             let photons = found.work.unwrap().amount;
             assert_eq!(found.request["volume"]["photon_transport"]["photons"], photons, "{name}");
             let truth = Truth::of(bench, &request, 128, Some(16 * photons));
-            // A field may be a lucky one: what is promised of nineteen in twenty is more than true of their mean square.
+            // A field may be a lucky one, so several are tested. A promise for nineteen in twenty of them is more than true of their mean square.
             let error_with = |photons: u64| {
                 let mut planned = found.request.clone();
                 let squared = (1..=4).map(|seed| {

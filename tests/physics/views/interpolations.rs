@@ -1,4 +1,4 @@
-//! What each interpolation makes of a closed form: the order of their errors, and how fast these fall with the voxels.
+//! Each interpolation against a closed form: the order of their errors, and the rate at which these fall with the voxels.
 
 use cloudchamber::volume::builtin::marschner_lobb_value;
 use glam::{DVec3, dvec3};
@@ -9,7 +9,7 @@ use super::support::{Camera, grid, pixels, request};
 const SIDE: usize = 48;
 const NAMES: [&str; 4] = ["nearest", "trilinear", "b_spline", "catmull_rom"];
 
-/// Planes through the volume, and cameras across from them; none is along the grid, so that places between voxels come up alike.
+/// Planes through the volume, and cameras across from them. None is along the grid, so that all places between voxels come up alike.
 fn views(span: f64) -> [(Camera, DVec3); 3] {
     [(dvec3(0.31, 0.17, 1.0), 0.07), (dvec3(1.0, -0.42, 0.23), -0.11), (dvec3(-0.37, 1.0, 0.71), 0.19)].map(
         |(normal, along)| {
@@ -22,7 +22,7 @@ fn views(span: f64) -> [(Camera, DVec3); 3] {
     )
 }
 
-/// Values of slices and where they are, at least so far inside of the cube from −1 to 1.
+/// The values of slices and their places, at least `margin` inside the cube from −1 to 1.
 fn values(volume: &Value, interpolation: &str, span: f64, margin: f64) -> Vec<(DVec3, f64)> {
     let mut values = Vec::new();
     for (camera, normal) in views(span) {
@@ -50,9 +50,9 @@ fn marschner_lobb_ranks_them_as_the_literature_does() {
     });
     let [nearest, trilinear, b_spline, catmull_rom] = errors;
     assert!(catmull_rom < 0.8 * trilinear, "{errors:?}");
-    // The one without a prefilter blurs: at this frequency it loses more than the kinks of the linear one do.
+    // The B-spline without a prefilter blurs. At this frequency it loses more than the kinks of the linear interpolation do.
     assert!(1.25 * trilinear < b_spline && b_spline < 0.97 * nearest, "{errors:?}");
-    // The ripple itself has a root mean square of 0.07: even the worst is nearer than a volume without it.
+    // The ripple itself has a root mean square of 0.07, so even the worst is nearer than a volume without it.
     assert!(nearest < 0.06, "{errors:?}");
 }
 
@@ -69,7 +69,7 @@ fn laplacian(p: DVec3) -> f64 {
         - 0.7 * WAVE[1].length_squared() * (WAVE[1].dot(p) - 0.8).cos()
 }
 
-/// Values of the smooth field from n voxels along each axis, at the same places for every n.
+/// The values of the smooth field from n voxels along each axis, at the same places for every n.
 fn sampled(n: usize, interpolation: &str) -> Vec<(DVec3, f64)> {
     let volume = grid([n; 3], [2.0 / n as f64; 3], smooth);
     values(&volume, interpolation, 1.37, 2.0 * 2.0 / 16.0)
@@ -89,7 +89,7 @@ fn errors_fall_with_the_voxels_at_each_ones_order() {
     }
 }
 
-/// Without a prefilter its error is known to the leading term: h²/6 times the second derivatives.
+/// Without a prefilter, its error is known to the leading term: h²/6 times the second derivatives.
 #[test]
 fn the_b_spline_blurs_by_a_sixth_of_the_laplacian() {
     let h = 2.0 / 64.0;

@@ -1,4 +1,4 @@
-//! A bright voxel of a scan is seen where the file's affine says, by projections that are worked out here.
+//! A bright voxel of a scan is seen at the place that the file's affine gives, by projections that are worked out here.
 
 use cloudchamber::volume::RawType;
 use glam::{DAffine3, DMat3, DVec3, dvec3};
@@ -12,7 +12,7 @@ const SIDE: usize = 48;
 const DIMS: [usize; 3] = [18, 22, 16];
 const DIM: f64 = 20.0;
 const BRIGHT: f64 = 200.0;
-/// Near three different ends, so that a mirrored or exchanged axis shows.
+/// The markers are near three different ends, so that a mirrored or exchanged axis shows.
 const MARKERS: [[usize; 3]; 2] = [[14, 5, 12], [3, 15, 9]];
 
 /// A file whose sform is the affine, with one bright voxel.
@@ -27,14 +27,14 @@ fn scan(affine: DAffine3, marker: [usize; 3]) -> Vec<u8> {
     file.with(&bytes)
 }
 
-/// Where the affine puts a voxel, from where it puts the grid's centre: the volume stands centred at the origin.
+/// The place of a voxel by the affine, relative to that of the grid's centre, since the volume is centred at the origin.
 fn place(affine: DAffine3, index: [usize; 3]) -> DVec3 {
     let index = DVec3::from_array(index.map(|i| i as f64));
     let centre = DVec3::from_array(DIMS.map(|n| (n as f64 - 1.0) / 2.0));
     affine.transform_point3(index) - affine.transform_point3(centre)
 }
 
-/// Right-anterior-superior as it is; stored as left-posterior-superior; and turned about two axes with long voxels.
+/// The affines: right-anterior-superior as it is; stored as left-posterior-superior; and turned about two axes with long voxels.
 fn affines() -> [(&'static str, DAffine3); 3] {
     let oblique = DMat3::from_rotation_z(0.5) * DMat3::from_rotation_x(-0.7);
     let at = dvec3(-83.0, 41.0, 17.0);
@@ -46,7 +46,7 @@ fn affines() -> [(&'static str, DAffine3); 3] {
     ]
 }
 
-/// From the right, the front and above, each in both projections.
+/// Cameras at the right, the front and above, each in both projections.
 fn cameras() -> Vec<Camera> {
     let mut cameras = Vec::new();
     for (axis, up) in [(DVec3::X, DVec3::Z), (DVec3::Y, DVec3::Z), (DVec3::Z, DVec3::Y)] {
@@ -57,7 +57,8 @@ fn cameras() -> Vec<Camera> {
     cameras
 }
 
-/// Steps are short, for a step may miss a surface around what is thinner. Each technique so that the dim rest shows as nothing, and which of a pixel's numbers tells the marker, less what.
+/// Each technique with its parameters, the channel that shows the marker, and the value to subtract from it. Steps are short, since a step may miss
+/// a surface around a thin part. The dim rest shows as nothing.
 fn forms() -> [(&'static str, Value, usize, f64); 3] {
     let points = json!([
         {"value": DIM + 30.0, "color": [1, 1, 1], "opacity_per_unit": 0},
@@ -70,7 +71,7 @@ fn forms() -> [(&'static str, Value, usize, f64); 3] {
     ]
 }
 
-/// The middle of what is bright, weighed by how bright: column and row.
+/// The centroid of the bright part, weighted by brightness: column and row.
 fn centroid(film: &[[f32; 4]], channel: usize, above: f64) -> (f64, f64) {
     let (mut weight, mut column, mut row, mut lit) = (0.0, 0.0, 0.0, 0);
     for (pixel, p) in film.iter().enumerate() {
@@ -98,7 +99,7 @@ fn a_marker_is_where_the_affine_says() {
                     let film = pixels(&request(technique, &volume, &camera.json(), SIDE, parameters));
                     let got = centroid(&film, channel, above);
                     let off = (got.0 - column).hypot(got.1 - row);
-                    // Half a voxel off, the commonest mistake with an affine, would be 0.6 pixels and more.
+                    // The commonest mistake with an affine, half a voxel, would be 0.6 pixels and more.
                     assert!(off < 0.5, "{name} {marker:?} {technique} {camera:?}: {got:?} for {column}, {row}");
                 }
             }
@@ -106,7 +107,7 @@ fn a_marker_is_where_the_affine_says() {
     }
 }
 
-/// Which way of the picture's middle a marker is: to the right, and up.
+/// The side of a marker from the picture's middle: true if it is to the right, and true if it is up.
 fn side_of_picture(volume: &Value, eye: DVec3, up: DVec3) -> (bool, bool) {
     let camera = Camera { eye, target: DVec3::ZERO, up, span: 34.0, perspective: true };
     let (technique, parameters, channel, above) = forms()[0].clone();
@@ -116,21 +117,21 @@ fn side_of_picture(volume: &Value, eye: DVec3, up: DVec3) -> (bool, bool) {
     (column > middle, row < middle)
 }
 
-/// In words rather than by a cross product, which could be as wrong here as there.
+/// The sides are in words rather than by a cross product, which could be as wrong here as there.
 #[test]
 fn right_anterior_and_superior_are_not_mirrored() {
     let house = House::shared();
-    // Voxels near the patient's right, front and top: at the far end of RAS, and at the near end of x and y where they run the other way.
+    // The voxels are near the patient's right, front and top: at the far end of RAS, and at the near end of x and y if they run the other way.
     for (affine, marker) in [(affines()[0].1, [14, 18, 12]), (affines()[1].1, [3, 3, 12])] {
         let volume = house.file(scan(affine, marker));
         let from = |eye: DVec3, up| side_of_picture(&volume, eye * 70.0, up);
-        // Face to face, the patient's right is on the left; from behind, on the right.
+        // Face to face, the patient's right is on the left. From behind, it is on the right.
         assert_eq!(from(DVec3::Y, DVec3::Z), (false, true), "from the front");
         assert_eq!(from(DVec3::NEG_Y, DVec3::Z), (true, true), "from behind");
-        // Seen from the right, the face looks to the right; from the left, to the left.
+        // Seen from the right, the face looks to the right. Seen from the left, it looks to the left.
         assert_eq!(from(DVec3::X, DVec3::Z), (true, true), "from the right");
         assert_eq!(from(DVec3::NEG_X, DVec3::Z), (false, true), "from the left");
-        // From above with the face up, the right is on the right; from the feet, on the left.
+        // Seen from above with the face up, the right is on the right. Seen from the feet, it is on the left.
         assert_eq!(from(DVec3::Z, DVec3::Y), (true, true), "from above");
         assert_eq!(from(DVec3::NEG_Z, DVec3::Y), (false, true), "from below");
     }

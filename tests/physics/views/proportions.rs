@@ -1,4 +1,4 @@
-//! Millimetres are millimetres along every axis, however long the voxels are, and however many.
+//! Millimetres are millimetres along every axis, whatever the length and the number of the voxels.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -10,25 +10,25 @@ use serde_json::{Value, json};
 use super::support::{Camera, grid, pixels, request};
 use crate::common::engine::House;
 
-/// So many that counting them is good for an area: at 48 the count of a true disc is up to 1 % off.
+/// The number of pixels is great enough for areas: at 48 the count of a true disc is up to 1 % off.
 const SIDE: usize = 96;
 const SPAN: f64 = 44.0;
 const RADIUS: f64 = 15.0;
-/// 48 mm along every axis.
+/// The volume has 48 mm along every axis.
 const DIMS: [usize; 3] = [60, 60, 20];
 const SPACING: [f64; 3] = [0.8, 0.8, 2.4];
 
-/// The distance from the centre in millimetres.
+/// The field: the distance from the centre in millimetres.
 fn distances() -> Value {
     grid(DIMS, SPACING, DVec3::length)
 }
 
-/// Along x, y and z, from a different side each.
+/// Cameras along x, y and z, from a different side each.
 fn cameras() -> [Camera; 3] {
     [DVec3::X, DVec3::NEG_Y, DVec3::Z].map(|axis| Camera::orthographic(axis * 100.0, SPAN))
 }
 
-/// Width and height are the diameter within a pixel, the area is that of a disc within 2 %, and its middle is the picture's.
+/// Checks that width and height are the diameter within a pixel, that the area is a disc's within 2 %, and that its middle is the picture's.
 fn assert_round(inside: &[bool], what: &str) {
     let pixel = SPAN / SIDE as f64;
     let places = || inside.iter().enumerate().filter(|(_, inside)| **inside).map(|(i, _)| (i % SIDE, i / SIDE));
@@ -73,7 +73,7 @@ fn its_depth_is_that_of_a_sphere_along_every_axis() {
             if off_axis < 0.7 * RADIUS {
                 let truth = 100.0 - (RADIUS * RADIUS - off_axis * off_axis).sqrt();
                 let off = f64::from(got[0]) - truth;
-                // The chords of a convex field lie above it: the surface lies deeper, by less than the chords' height over cos 45°.
+                // The chords of a convex field lie above it, so the surface lies deeper, by less than the chords' height over cos 45°.
                 assert!((-1e-3..chords(RADIUS) * 1.5).contains(&off), "from {}: {} for {truth}", camera.eye, got[0]);
                 compared += 1;
             }
@@ -82,12 +82,12 @@ fn its_depth_is_that_of_a_sphere_along_every_axis() {
     }
 }
 
-/// How far trilinear interpolation lies above a distance of `r` at most: h²/8 of its second derivative, which is 1/r, an axis.
+/// The greatest height of trilinear interpolation above a distance of `r`: for each axis, h²/8 of its second derivative, which is 1/r.
 fn chords(r: f64) -> f64 {
     SPACING.iter().map(|h| h * h / 8.0 / (r - SPACING[2])).sum()
 }
 
-/// The distance of each pixel's ray from the centre, as a film has it.
+/// Checks that a film has the distance of each pixel's ray from the centre.
 fn assert_distances(film: &[[f32; 4]], camera: &Camera, what: &str) {
     let mut compared = 0;
     for (pixel, got) in film.iter().enumerate() {
@@ -119,7 +119,7 @@ fn its_least_value_along_a_ray_and_its_slice_are_round_too() {
     }
 }
 
-/// Soft blobs that fade out well within the cube from -1 to 1, from so many voxels along each axis.
+/// Soft blobs that fade out well within the cube from -1 to 1, from `n` voxels along each axis.
 fn blobs(n: usize, shift: DVec3) -> Value {
     let blob = |p: DVec3, at: DVec3, width: f64| (-(p - shift - at).length_squared() / (width * width)).exp();
     grid([n; 3], [2.0 / n as f64; 3], |p| {
@@ -127,7 +127,7 @@ fn blobs(n: usize, shift: DVec3) -> Value {
     })
 }
 
-/// Unshaded, shaded and a surface.
+/// The forms: unshaded, shaded, and a surface.
 fn forms() -> [(&'static str, Value); 3] {
     let points = json!([
         {"value": 0.1, "color": [1, 0.3, 0.1], "opacity_per_unit": 0},
@@ -141,7 +141,7 @@ fn forms() -> [(&'static str, Value); 3] {
     ]
 }
 
-/// A picture of the blobs; the step is given in the world, so that it is the same whatever the voxels.
+/// A picture of the blobs. The step is given in world units, so that it is the same whatever the voxels.
 fn of_blobs(n: usize, shift: DVec3, step: f64, (technique, parameters): &(&str, Value)) -> (Arc<Film>, ErrorEstimate) {
     let camera = json!({"eye": [1.9, 1.1, 2.3], "fov_y_deg": 34});
     let mut request = request(technique, &blobs(n, shift), &camera, 32, parameters.clone());
@@ -152,7 +152,7 @@ fn of_blobs(n: usize, shift: DVec3, step: f64, (technique, parameters): &(&str, 
 
 #[test]
 fn twice_the_voxels_show_the_same() {
-    // Of the coarser grid that is compared; a surface's rim is thinner than a voxel, and a step as long would say so.
+    // The voxel is that of the coarser grid. A surface's rim is thinner than a voxel, and the film of a step of that length would report an error.
     let voxel = 2.0 / 32.0;
     let step = 0.5 * voxel;
     for form in forms() {
@@ -161,14 +161,14 @@ fn twice_the_voxels_show_the_same() {
         let (before, off) = (coarsest.difference(&coarse).unwrap(), coarse.difference(&fine).unwrap());
         let order = (before / off).log2();
         assert!((1.7..2.3).contains(&order), "{form:?}: order {order}, {before} and {off}");
-        // So the interpolation's own error is a quarter of what twice the side made; the rest is what the film says of itself.
+        // So the interpolation's own error is a quarter of the one with voxels of twice the side. The rest is the film's own error estimate.
         let bound = error.total + before / 4.0;
         assert!(error.total < 0.06, "{form:?}: an error of {} would bound anything", error.total);
         assert!(off < bound, "{form:?}: {off} for {bound}");
         let (halved, _) = of_blobs(64, DVec3::ZERO, 0.5 * step, &form);
         let off = coarse.difference(&halved).unwrap();
         assert!(off < bound, "{form:?}, half the step: {off} for {bound}");
-        // Half a voxel's shift, the commonest mistake of resampling, is beyond it.
+        // A shift by half a voxel, the commonest mistake of resampling, is beyond the bound.
         let (shifted, _) = of_blobs(64, DVec3::splat(0.5 * voxel), step, &form);
         let off = coarse.difference(&shifted).unwrap();
         assert!(off > 2.0 * bound, "{form:?}: {off} is not beyond {bound}");

@@ -1,11 +1,11 @@
-//! Volumes with a spacing, and a camera whose projection is worked out here rather than asked for.
+//! Volumes with a spacing, and a camera whose projection is worked out here rather than taken from the program.
 
 use glam::{DVec3, dvec3};
 use serde_json::{Value, json};
 
 use crate::common::engine::House;
 
-/// A raw volume of floats; `value` is asked at voxel centres, in world units from the volume's centre.
+/// A raw volume of floats. `value` is called at voxel centres, in world units from the volume's centre.
 pub fn grid(dims: [usize; 3], spacing: [f64; 3], value: impl Fn(DVec3) -> f64) -> Value {
     let mut bytes = Vec::new();
     let centre = |axis: usize, i: usize| (i as f64 - (dims[axis] as f64 - 1.0) / 2.0) * spacing[axis];
@@ -33,13 +33,13 @@ pub struct Camera {
     pub eye: DVec3,
     pub target: DVec3,
     pub up: DVec3,
-    /// World units that the picture is high at the target.
+    /// The height of the picture at the target, world units.
     pub span: f64,
     pub perspective: bool,
 }
 
 impl Camera {
-    /// An orthographic one that looks at the origin, with y or else z up.
+    /// An orthographic camera that looks at the origin, with y up, or else z.
     pub fn orthographic(eye: DVec3, span: f64) -> Self {
         let up = if eye.normalize().y.abs() > 0.9 { DVec3::Z } else { DVec3::Y };
         Self { eye, target: DVec3::ZERO, up, span, perspective: false }
@@ -54,14 +54,14 @@ impl Camera {
         })
     }
 
-    /// To the right, up and ahead.
+    /// The directions to the right, up and ahead.
     pub fn axes(&self) -> (DVec3, DVec3, DVec3) {
         let ahead = (self.target - self.eye).normalize();
         let right = ahead.cross(self.up).normalize();
         (right, right.cross(ahead), ahead)
     }
 
-    /// Where a world point is in a picture of `side` pixels: column and row, with pixel centres at whole numbers.
+    /// The place of a world point in a picture of `side` pixels: column and row, with pixel centres at whole numbers.
     pub fn project(&self, p: DVec3, side: usize) -> (f64, f64) {
         let (right, up, ahead) = self.axes();
         let from = p - self.eye;
@@ -80,7 +80,7 @@ impl Camera {
     }
 }
 
-/// The request of one sample a pixel; `parameters` go under the technique's name.
+/// The request of one sample a pixel. `parameters` go under the technique's name.
 pub fn request(technique: &str, volume: &Value, camera: &Value, side: usize, parameters: Value) -> Value {
     json!({
         "technique": technique, "volume": volume, "camera": camera, "image": {"width": side, "height": side},

@@ -9,10 +9,10 @@ const SIDE: usize = 32;
 const DIMS: [usize; 3] = [20, 24, 28];
 const SPACING: f64 = 0.07;
 const TOLERANCE: f32 = 1e-5;
-/// Where rounding may tip samples into the transfer function's next entry.
+/// The tolerance if rounding may move samples into the transfer function's next entry.
 const TOLERANCE_OF_TABLES: f32 = 1e-4;
 
-/// A quarter turn: exact, so that voxels go to voxels.
+/// A quarter turn. It is exact, so that voxels go to voxels.
 fn quarter(axis: usize) -> DMat3 {
     let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z];
     match axis {
@@ -22,7 +22,7 @@ fn quarter(axis: usize) -> DMat3 {
     }
 }
 
-/// Different along every axis and at both ends of each: waves, a ball, and a bar with edges.
+/// A field that is different along every axis and at both ends of each: waves, a ball, and a bar with edges.
 fn field(p: DVec3) -> f64 {
     let waves = 0.35 + 0.12 * (3.1 * p.x + 0.4).sin() + 0.1 * (4.3 * p.y - 1.0).cos() + 0.15 * p.z;
     let ball = 0.5 * (-(p - dvec3(0.25, -0.3, 0.4)).length_squared() / 0.05).exp();
@@ -36,7 +36,7 @@ fn volume(turn: DMat3) -> Value {
     grid(dims, [SPACING; 3], |p| field(turn.transpose() * p))
 }
 
-/// Everything in the request that has a direction, before a turn.
+/// All parts of the request that have a direction, before a turn.
 struct Look {
     camera: Camera,
     light: DVec3,
@@ -66,7 +66,7 @@ fn looks() -> [Look; 2] {
     [seen(dvec3(2.1, 1.4, 1.9), true), seen(dvec3(-1.3, 0.7, 2.6), false)]
 }
 
-/// The picture after a turn of the volume alone by `of_volume`, and of all else by `of_look`.
+/// The picture after a turn of the volume alone by `of_volume`, and of all other parts by `of_look`.
 fn picture(technique: &str, of_volume: DMat3, of_look: DMat3, look: &Look, form: &Form) -> Vec<[f32; 4]> {
     let look = look.turned(of_look);
     pixels(&request(technique, &volume(of_volume), &look.camera.json(), SIDE, form(&look)))
@@ -78,7 +78,7 @@ fn apart(a: &[[f32; 4]], b: &[[f32; 4]]) -> f32 {
 
 type Form = dyn Fn(&Look) -> Value;
 
-/// The film is the same after a turn of all, and another after a turn of the volume alone or the wrong way.
+/// Checks that the film is the same after a turn of all, and another after a turn of the volume alone or the wrong way.
 fn check(technique: &str, form: &Form) {
     let tolerance = if technique == "emission_absorption" { TOLERANCE_OF_TABLES } else { TOLERANCE };
     for look in looks() {
@@ -102,7 +102,8 @@ fn check(technique: &str, form: &Form) {
     }
 }
 
-/// Soft, red to blue, and so gently that a sample which rounding tips into the table's next entry stays within the tolerance.
+/// A soft transfer function from red to blue. It is so gentle that a sample which rounding moves into the table's next entry stays within the
+/// tolerance.
 fn transfer_function() -> Value {
     json!({"points": [
         {"value": 0.2, "color": [0.9, 0.1, 0.1], "opacity_per_unit": 0.0},
@@ -116,7 +117,7 @@ fn emission_absorption_turns() {
     for shading in [false, true] {
         check("emission_absorption", &move |look: &Look| {
             json!({
-                // A ray that ends at a threshold would end a step apart where rounding tips it.
+                // A ray that ends at a threshold would end a step apart because of rounding.
                 "transfer_function": transfer_function(), "shading": shading, "opacity_threshold": 1,
                 "light": {"direction": look.light.to_array()}
             })

@@ -1,4 +1,4 @@
-//! Volumes of words, over all of their range and at every number of lanes, look as the same values do in floats.
+//! Volumes of words, over all of their range and at every number of lanes, look like the same values in floats.
 
 use cloudchamber::volume::RawQuery;
 use serde_json::{Value, json};
@@ -7,7 +7,7 @@ use crate::common::engine::House;
 
 const SIDE: usize = 40;
 
-/// Waves over all 16 bits, and a block of the least beside the greatest, so that neighbours differ by as much as they can.
+/// Waves over all 16 bits, and a block of the least beside the greatest values, so that neighbours differ as much as possible.
 fn value(i: usize) -> u16 {
     let [x, y, z] = [i % SIDE, i / SIDE % SIDE, i / (SIDE * SIDE)];
     if (12..20).contains(&x) && (12..30).contains(&y) {
@@ -23,7 +23,7 @@ fn volume(house: &House, name: &str, bytes: Vec<u8>) -> Value {
     json!({"id": house.assets().volumes().insert(bytes, name, query.parse().unwrap()).unwrap().1})
 }
 
-/// What is looked at by values from `least` on.
+/// Views of values from `least` on.
 fn views(least: f64) -> Vec<(&'static str, Value)> {
     let at = |part: f64| least + 65535.0 * part;
     let points = json!([{"value": at(0.2), "color": [0.2, 0.4, 1], "opacity_per_unit": 0},
@@ -46,7 +46,7 @@ fn words_of_all_their_range_look_as_floats() {
             let words = all.iter().map(|v| (i32::from(*v) + least) as u16).flat_map(u16::to_le_bytes).collect();
             let (floats, words) = (volume(house, "f32", floats), volume(house, name, words));
             for (technique, own) in views(f64::from(least)) {
-                // Pixels of a third of a voxel, so that lanes are near each other.
+                // Pixels are a third of a voxel, so that lanes are near each other.
                 let look = |volume: &Value| {
                     let (film, _) = house.film(&json!({"technique": technique, "volume": volume, technique: own,
                         "image": {"width": 120, "height": 100}, "budget": {"samples": 1}}));
@@ -55,8 +55,8 @@ fn words_of_all_their_range_look_as_floats() {
                 let (expected, found) = (look(&floats), look(&words));
                 let apart = |(a, b): (&f32, &f32)| f64::from((a - b).abs());
                 let mean = expected.iter().zip(&found).map(apart).sum::<f64>() / expected.len() as f64;
-                // Weights of 15 bits lose 2 of 65535 where neighbours are as far apart as they can be; at an isosurface's edge that decides
-                // whether a ray meets it at all.
+                // Weights of 15 bits lose 2 of 65535 if neighbours are as far apart as they can be. At an isosurface's edge that decides if a ray
+                // meets it at all.
                 assert!(mean < 1e-4, "{technique} {own} of {name}, {lanes} lanes: {mean:e} apart on average");
                 assert!(expected.iter().any(|v| *v > 0.1), "{technique} {own}: nothing is there");
             }

@@ -67,7 +67,7 @@ fn one_scattering_is_single_scatter() {
         let own = with(&json!({"medium": medium(), "lights": lights()}), &more);
         let path = picture("volume_path", &smoke, &with(&own, &json!({"max_scatterings": 1})), 1);
         let single = picture("single_scatter", &smoke, &own, 2);
-        // A point light among the smoke makes the path's pixels so noisy that their own error is not known well.
+        // A point light in the smoke makes the path's pixels so noisy that their own error is not known well.
         if more["lights"][0]["type"] == "point" {
             agree(mean(&path), mean(&single), &more.to_string());
         } else {
@@ -86,7 +86,7 @@ fn aiming_at_lights_changes_no_mean() {
         let medium = json!({"sigma_t_per_unit": 10, "albedo": 0.9, "phase": {"type": "henyey_greenstein", "g": g}});
         let own = |next_event: bool| json!({"medium": medium, "lights": lights, "next_event": next_event});
         let (on, off) = (picture("volume_path", &smoke, &own(true), 1), picture("volume_path", &smoke, &own(false), 2));
-        // By chance lights are met so seldom that a pixel's error is not known well; that of all pixels is.
+        // Lights are met by chance so seldom that a pixel's error is not known well, but the error of all pixels is.
         let (a, b) = (total(&on), total(&off));
         let z = (a.0 - b.0) / (a.1 + b.1).sqrt();
         assert!(z.abs() <= 3.5, "g {g}: {a:?} and {b:?}, z {z}");
@@ -95,7 +95,7 @@ fn aiming_at_lights_changes_no_mean() {
 
 #[test]
 fn a_box_is_a_grid_of_one_value() {
-    // One voxel of another value in the last place makes it a grid.
+    // One voxel with another value in the last place makes the volume a grid.
     let grid = House::shared().floats([16, 16, 16], |x, y, z| if x + y + z < -2.8 { 1.0 + 1e-6 } else { 1.0 });
     let own = json!({"medium": {"sigma_t_per_unit": 2, "albedo": 0.9}, "lights": lights()});
     let closed = picture("volume_path", &json!({"builtin": "constant", "resolution": 16}), &own, 1);
@@ -155,7 +155,7 @@ fn colours_are_three_grey_renders() {
 
 #[test]
 fn lights_one_at_a_time_and_all_in_turn_have_the_same_mean() {
-    // The path chooses one of four lights, single scattering aims at each: the balance of the two against the phase function differs.
+    // The path chooses one of four lights, and single scattering aims at each. The balance of the two against the phase function differs.
     let smoke = json!({"builtin": "smoke", "resolution": 48});
     let lights = json!([{"type": "sphere", "position": [0.1, 0.3, -0.9], "radius": 0.3, "radiance": 4}, {"type": "sun", "angular_diameter_deg": 30},
         {"type": "quad", "corner": [-1, 1.2, -1], "edge_u": [2, 0, 0], "edge_v": [0, 0, 2], "radiance": 2}, {"type": "sky", "radiance": 0.1}]);

@@ -1,4 +1,4 @@
-//! Where methods fail: what a right one shows.
+//! The limits of the methods, and the pictures of right ones.
 
 use serde_json::{Value, json};
 
@@ -64,7 +64,7 @@ fn the_camera_may_stand_in_the_medium_and_lights_too() {
             finite(&film);
         }
     }
-    // Along an axis, on a face.
+    // The ray goes along an axis, on a face.
     let camera = json!({"eye": [0, 1, -3], "target": [0, 1, 0], "up": [0, 0, 1]});
     let camera =
         json!({"eye": camera["eye"], "target": camera["target"], "up": [0, 1, 0], "projection": "orthographic"});
@@ -136,7 +136,7 @@ fn a_broken_majorant_is_biased_and_said_to_be() {
 
 #[test]
 fn beside_voxels_that_are_not_a_number_the_rest_is_as_it_is() {
-    // The half x > 0 of density 1, beside nothing and beside NaN: of the nearest voxels, the same.
+    // The half x > 0 has density 1, and the other half is empty or NaN. With the nearest voxels, both give the same.
     let half = |other: f64| House::shared().floats([16, 16, 16], move |x, _, _| if x < 0.0 { other } else { 1.0 });
     let sun = json!([{"type": "sun", "direction": [0.3, 1, 0.2]}, {"type": "sky", "radiance": 0.1, "up": [0, 1, 0]}]);
     for technique in ["volume_path", "single_scatter"] {
@@ -144,7 +144,7 @@ fn beside_voxels_that_are_not_a_number_the_rest_is_as_it_is() {
             let run = |other: f64, seed: u64| {
                 let own = json!({"medium": {"sigma_t_per_unit": 3}, "lights": sun, "tracking": tracking, "interpolation": "nearest"});
                 let camera = json!({"eye": [3.0, 0.5, 1.0], "up": [0, 1, 0], "fov_y_deg": 30});
-                // Of 48² pixels the mean of z² has a deviation of 0.03: 1.15 is not reached by chance.
+                // With 48² pixels the mean of z² has a deviation of 0.03, so 1.15 is not reached by chance.
                 let mut request = scene(technique, &half(other), &camera, &own, 48, 64);
                 request["seed"] = json!(seed);
                 let job = House::shared().finish(&request);

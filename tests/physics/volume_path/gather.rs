@@ -1,5 +1,5 @@
-//! The same scene through photons from the light and paths from the eye: `photon_transport`'s gather, integrated here along the rays in double
-//! precision, against what `volume_path` and `single_scatter` see.
+//! The same scene through photons from the light and through paths from the eye: `photon_transport`'s gather, integrated here along the rays in
+//! double precision, against the pictures of `volume_path` and `single_scatter`.
 
 use serde_json::{Value, json};
 
@@ -16,11 +16,11 @@ fn density(x: f64, y: f64, z: f64) -> f64 {
     (-2.0 * (x * x + y * y + z * z)).exp() + 0.1
 }
 
-/// Rays of a pixel's side.
+/// The number of rays along a pixel's side.
 const FINE: usize = 4;
 
-/// The radiance that comes to the eye along a ray of a picture of `FINE` times the side: the integral of T sigma_s G, G the mean of the phase function over the light
-/// of a voxel.
+/// The radiance that comes to the eye along a ray of a picture of `FINE` times the side: the integral of T sigma_s G. G is the mean of the phase
+/// function over the light of a voxel.
 fn seen(gather: &dyn Fn([usize; 3]) -> f64, sigma_s: f64, column: usize, row: usize) -> f64 {
     let minus = |a: [f64; 3], b: [f64; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
     let cross =
@@ -58,7 +58,7 @@ fn by_photons(volume: &Value, albedo: f64, g: f64) -> f64 {
         "budget": {"samples": 1}});
     let job = House::shared().finish(&request);
     let field = job.field().unwrap();
-    // Per photon; an irradiance of 1 on the face of 2 × 2 mm is four of them.
+    // The gather is per photon. An irradiance of 1 on the face of 2 × 2 mm is four of them.
     let gather = |[x, y, z]: [usize; 3]| 4.0 * field.value(x, y, z);
     let side = FINE * SIDE;
     let rays = (0..side * side).map(|i| seen(&gather, SIGMA_T * albedo, i % side, i / side));
@@ -69,7 +69,7 @@ fn by_photons(volume: &Value, albedo: f64, g: f64) -> f64 {
 fn photons_from_the_light_and_paths_from_the_eye_make_the_same_picture() {
     let volume = House::shared().floats([N, N, N], density);
     let camera = json!({"eye": EYE, "up": [0, 1, 0], "fov_y_deg": FOV_DEG});
-    // Of a faint albedo nearly all light is scattered once: what is scattered twice is less than 2 % of 0.02.
+    // With a faint albedo nearly all light is scattered once. The light that is scattered twice is less than 2 % of 0.02.
     for (technique, albedo, g) in [("volume_path", 0.9, 0.0), ("volume_path", 0.8, 0.6), ("single_scatter", 0.002, 0.3)]
     {
         let own = json!({"medium": {"sigma_t_per_unit": SIGMA_T, "albedo": albedo, "phase": {"type": "henyey_greenstein", "g": g}},

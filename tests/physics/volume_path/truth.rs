@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use crate::common::engine::House;
 use crate::common::light::{agrees, channel, film, mean, scene, spot};
 
-/// A half-space is a cube of 800 mean free paths a side, seen in its middle.
+/// The extinction of a half-space: a cube of 800 mean free paths a side, seen in its middle.
 const DENSE: f64 = 400.0;
 
 fn sky(visible: bool) -> Value {
@@ -39,8 +39,8 @@ fn a_furnace_is_1_everywhere() {
 
 #[test]
 fn a_furnace_of_six_quads_is_1_within_its_error() {
-    // Aiming and chance together have to make 1, with lights outside and inside of the volume. Lights do not stop light: around those inside
-    // the volume is empty, so that a path which has met one of them meets no other.
+    // Next-event estimation and chance together have to make 1, with lights outside and inside the volume. Lights do not stop light. The volume is
+    // empty around those inside, so that a path which has met one of them meets no other.
     let core = House::shared().floats([24; 3], |x, y, z| f64::from(u8::from(x.abs().max(y.abs()).max(z.abs()) < 0.7)));
     for (half, volume) in [(1.3, constant()), (0.8, core)] {
         let quad = |corner: [f64; 3], u: [f64; 3], v: [f64; 3]| {
@@ -57,7 +57,7 @@ fn a_furnace_of_six_quads_is_1_within_its_error() {
             let camera = json!({"eye": [0.3, 0.1, -0.2], "fov_y_deg": 90});
             let film = film(House::shared(), &scene("volume_path", &volume, &camera, &own, 48, 64));
             agrees(mean(&film), 1.0, 0.0, &format!("six quads at {half}, next event {next_event}"));
-            // Light is scattered on the way: without, every sample would be 1.
+            // Light is scattered on the way. Without that, every sample would be 1.
             assert_eq!(film.main.m2.iter().any(|squares| *squares > 0.0), next_event, "{half}");
         }
     }
@@ -66,7 +66,7 @@ fn a_furnace_of_six_quads_is_1_within_its_error() {
 #[test]
 fn p19_beer_lambert_at_any_angle() {
     for from in [[0.0, 0.0, 1.0], [0.5, 0.3, 1.0], [0.2, 0.9, 1.0]] {
-        // Away from the edges of the faces z = -1 and z = 1 that the ray goes through.
+        // The ray stays away from the edges of the faces z = -1 and z = 1 through which it goes.
         let length = 2.0 * from.iter().map(|v| v * v).sum::<f64>().sqrt();
         for sigma in [0.05, 0.7, 2.0] {
             let own = json!({"medium": {"sigma_t_per_unit": sigma, "albedo": 0}, "lights": sky(true)});
@@ -85,7 +85,7 @@ fn p19_beer_lambert_at_any_angle() {
 
 #[test]
 fn p19_through_a_gaussian_by_each_tracker() {
-    // Along the axis through the middle: the integral of exp(-r^2 / 2 s^2) is s sqrt(2 pi) erf(1 / (s sqrt 2)).
+    // Along the axis through the middle, the integral of exp(-r^2 / 2 s^2) is s sqrt(2 pi) erf(1 / (s sqrt 2)).
     let (s, sigma) = (0.3f64, 1.5);
     let depth = sigma * s * (2.0 * std::f64::consts::PI).sqrt() * (1.0 - 8.581_20e-4);
     for (tracking, grid, known_to) in
@@ -93,7 +93,7 @@ fn p19_through_a_gaussian_by_each_tracker() {
     {
         let own = json!({"medium": {"sigma_t_per_unit": sigma, "albedo": 0}, "lights": sky(true), "tracking": tracking,
             "majorant": {"grid": grid}});
-        // In the middle of the voxels of an odd number.
+        // With an odd number of voxels, the ray goes through their middles.
         let volume = json!({"builtin": "gaussian", "resolution": 129});
         let film = film(House::shared(), &scene("volume_path", &volume, &spot([0.0, 0.0, 1.0], 0.007), &own, 64, 64));
         agrees(mean(&film), (-depth).exp(), known_to, tracking);
@@ -133,13 +133,13 @@ fn p2_a_half_space_behind_a_face_that_reflects() {
 
 #[test]
 fn a_pane_of_glass_reflects_by_fresnel() {
-    // Without extinction: what is not sky behind is sky before; a furnace, whatever the index.
+    // Without extinction, the sky is seen through the pane or reflected by it, and never lost: a furnace, whatever the index.
     let own = json!({"medium": {"sigma_t_per_unit": 0, "index": 1.5}, "lights": sky(true)});
     let request = scene("volume_path", &constant(), &json!({"eye": [2.0, 1.5, 3.0]}), &own, 32, 16);
     for pixel in film(House::shared(), &request).main.mean.chunks_exact(4) {
         assert!((pixel[0] - 1.0).abs() < 1e-5, "{pixel:?}");
     }
-    // Under a sky that is only above, the upper face, which is seen at 60 degrees, reflects 0.0892 of it; what enters leaves below or is
+    // Under a sky that is only above, the upper face, which is seen at 60 degrees, reflects 0.0892 of it. The light that enters leaves below or is
     // turned back.
     let lights = json!([{"type": "sky", "zenith": 1, "horizon": 1, "ground": 0, "up": [0, 1, 0]}]);
     let own = json!({"medium": {"sigma_t_per_unit": 40, "albedo": 0, "index": 1.5}, "lights": lights});
@@ -161,7 +161,7 @@ fn with_target(mut camera: Value, target: [f64; 3]) -> Value {
 
 #[test]
 fn emission_of_a_box() {
-    // L = (emission / sigma) (1 - exp(-sigma length)), by colour.
+    // The truth is L = (emission / sigma) (1 - exp(-sigma length)), by colour.
     let (sigma, emission) = ([0.5, 1.0, 2.0], [0.3, 0.2, 0.1]);
     let own = json!({"medium": {"sigma_t_per_unit": sigma, "albedo": 0, "emission": emission}, "lights": []});
     let request = scene("volume_path", &constant(), &spot([0.0, 0.0, 1.0], 0.01), &own, 64, 256);
@@ -174,7 +174,7 @@ fn emission_of_a_box() {
 
 #[test]
 fn camera_and_light_change_places() {
-    // Helmholtz: what a sun of irradiance 1 from b shows towards a, over the cosine of b, is what one from a shows towards b.
+    // By Helmholtz reciprocity, the light of a sun of irradiance 1 from b towards a, over the cosine of b, is that of a sun from a towards b.
     let (a, b) = ([0.0, 0.2, 1.0], [0.9, 0.3, 0.5]);
     let cosine = |d: [f64; 3]| d[2] / d.iter().map(|v| v * v).sum::<f64>().sqrt();
     let medium = json!({"sigma_t_per_unit": 60, "albedo": 0.95, "phase": {"type": "henyey_greenstein", "g": 0.7}});

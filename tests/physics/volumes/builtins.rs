@@ -73,7 +73,7 @@ fn shepp_logan_has_the_greys_of_its_table() {
         ([0.06, -0.65, -0.25], 0.3),
         ([0.06, -0.105, 0.625], 0.4),
         ([0.0, 0.1, 0.625], 0.0),
-        // The left ventricle's long axis points to 108°: up and outwards; its mirror image is brain.
+        // The left ventricle's long axis points to 108°, up and outwards. Its mirror image is brain.
         ([-0.22 - 0.118, 0.361, -0.25], 0.0),
         ([-0.22 + 0.118, -0.361, -0.25], 0.0),
         ([-0.22 - 0.118, -0.361, -0.25], 0.2),
@@ -124,7 +124,7 @@ fn sphere_and_gaussian_have_their_volumes() {
     assert_eq!((sphere.value(32, 32, 32), sphere.value(0, 0, 0)), (1.0, 0.0));
     let edge = (0..64).map(|x| sphere.value(x, 32, 32)).filter(|&v| v > 0.0 && v < 1.0).count();
     assert!((1..=4).contains(&edge), "an edge of one voxel on each side, found {edge}");
-    // Cut at 1 / 0.3 standard deviations, which loses erf's tail of 8.6e-4 along each axis.
+    // The Gaussian is cut at 1 / 0.3 standard deviations, which loses erf's tail of 8.6e-4 along each axis.
     let whole = (2.0 * PI).powf(1.5) * GAUSSIAN_SIGMA.powi(3);
     close(integral(&build("gaussian", 48, 0).unwrap()), whole, 3.5e-3 * whole);
     assert_eq!(build("constant", 8, 0).unwrap().range(), [1.0, 1.0]);

@@ -1,4 +1,4 @@
-//! Every type in both byte orders through every format, and what headers say about values and place.
+//! Every type in both byte orders through every format, and the headers' values and places.
 
 use crate::common::writers::*;
 use cloudchamber::error::Error;
@@ -19,7 +19,7 @@ const NRRD_TYPES: [(RawType, &[&str]); 10] = [
     (RawType::F64, &["double"]),
 ];
 
-/// Values that need all bytes of every type, some of which no 32-bit float holds.
+/// Values that need all bytes of every type. No 32-bit float holds some of them.
 fn values() -> Vec<f64> {
     let mut values =
         vec![0.0, -1.0, 1.0, 255.0, -128.0, 258.0, -32768.0, 65535.0, 16_777_217.0, -123_456_789.0, 4e9, 9e18];
@@ -43,7 +43,7 @@ fn assert_values(volume: &Volume, raw: RawType, case: &str) {
     let expected: Vec<f32> = values().into_iter().map(|value| through(raw, value)).collect();
     let found: Vec<f32> = (0..60).map(|i| volume.voxels().get_f32(i)).collect();
     assert_eq!(found, expected, "{case}");
-    // x fastest, then y, then z.
+    // The order is x fastest, then y, then z.
     assert_eq!(volume.value(1, 2, 2), f64::from(expected[1 + 5 * (2 + 4 * 2)]), "{case}");
     assert!(volume.value(5, 0, 0).is_nan(), "{case}");
 }
@@ -167,7 +167,7 @@ fn linear_of(volume: &Volume) -> DMat3 {
 #[test]
 fn the_affine_keeps_flips_and_rotations() {
     let (mut file, data) = small_nifti();
-    // Radiological storage: x runs to the left; and a rotation of the other two axes.
+    // The rows are of radiological storage, in which x runs to the left, and of a rotation of the other two axes.
     let rows = [[-2.0, 0.0, 0.0, 90.0], [0.0, 0.0, -4.0, -126.0], [0.0, 3.0, 0.0, -72.0]];
     file.put_sform(rows);
     let volume = read_file(&file.with(&data)).unwrap();
@@ -190,7 +190,7 @@ fn the_quaternion_gives_the_rotation_it_stands_for() {
         let expected = DMat3::from_cols(DVec3::Y * 2.0, DVec3::NEG_X, DVec3::Z * z);
         assert!(linear.abs_diff_eq(expected, 1e-6), "qfac {qfac}: {linear}");
     }
-    // Half a turn about x: the real part is 0, and rounding may make it the root of a negative number.
+    // Half a turn about x has a real part of 0, which rounding may make the root of a negative number.
     let (mut file, data) = small_nifti();
     file.put_qform([1.000_000_1, 0.0, 0.0, 0.0, 0.0, 0.0], 1.0);
     let linear = linear_of(&read_file(&file.with(&data)).unwrap());

@@ -20,7 +20,7 @@ fn a_volume_large_enough_for_threads_is_counted_whole() {
     assert_eq!(volume.histogram().counts, counts, "a bin a grey level");
     let (shifted, last) = (volume.range(), 65 * 70 * 130 - 1);
     assert_eq!(shifted, [0.0, 255.0]);
-    // The extremes are found wherever they are.
+    // The extremes are found at any place.
     let one = |at: usize, value: i16| {
         let mut voxels = vec![7i16; last + 1];
         voxels[at] = value;

@@ -1,4 +1,4 @@
-//! Files that lie, end early or explode. None may panic, take memory that the data do not justify, or take long.
+//! Files that lie, end early or explode. None may cause a panic, take memory that the data do not justify, or take long.
 
 use crate::common::writers::*;
 use cloudchamber::error::{Error, Result};
@@ -62,7 +62,7 @@ fn a_gzip_bomb_is_not_inflated() {
 fn announced_sizes_are_believed_only_with_data() {
     let generous = VolumeLimits { max_volume_bytes: 1 << 50, max_side: usize::MAX };
     let nifti_of = |dims, raw| Nifti::new(false, dims, raw).with(&[0; 100]);
-    // 5 GB and 34 TB announced, a hundred bytes sent.
+    // The headers announce 5 GB and 34 TB, and a hundred bytes are sent.
     for dims in [[2048, 2048, 1280], [32767, 32767, 32767]] {
         let file = nifti_of(dims, RawType::U8);
         for sent in [file.clone(), gzip(&file)] {
@@ -70,7 +70,7 @@ fn announced_sizes_are_believed_only_with_data() {
         }
     }
     assert!(too_large(read_file(&nifti_of([2048, 2048, 1280], RawType::U8))));
-    // 64 MiB of f64 in the file are 32 MiB in memory: the limit is on what is kept.
+    // 64 MiB of f64 in the file are 32 MiB in memory. The limit is on the memory that is kept.
     assert_eq!(pointer(read_file(&nifti_of([256, 256, 128], RawType::F64))), "header:dim");
     for sizes in ["4294967296 4294967296 4294967296", "18446744073709551615 2 1", "2097152 2097152 4194304"] {
         let file = nrrd(&format!("type: double\nendian: big\ndimension: 3\nencoding: raw\nsizes: {sizes}"), &[0; 64]);
@@ -192,7 +192,7 @@ fn what_is_no_volume_is_refused_with_the_formats_read() {
     }
 }
 
-/// Thousands of damaged files: any answer is right but a panic, a large volume, or a long wait.
+/// Thousands of damaged files. Any answer is right but a panic, a large volume, or a long wait.
 #[test]
 fn damaged_files_do_no_harm() {
     let (file, data) = small_nifti();

@@ -11,7 +11,7 @@ fn random_floats(n: usize) -> Vec<f32> {
     (0..n).map(|_| (random.next() % 1000) as f32 - 300.0).collect()
 }
 
-/// The mean over the box from `low` to `high` in index space, by so many places along each side.
+/// The mean over the box from `low` to `high` in index space, by `places` places along each side.
 fn mean_in(volume: &Volume, low: [f64; 3], high: [f64; 3], places: [usize; 3]) -> f64 {
     let at = |a: usize, i: usize| (low[a] + (high[a] - low[a]) * (i as f64 + 0.5) / places[a] as f64) as usize;
     let (wide, tall, count) = (places[0], places[1], places.iter().product());
@@ -31,7 +31,7 @@ fn a_voxel_of_a_level_is_the_mean_of_what_it_covers() {
                     let end = |i: usize, a: usize| i as f64 * dims[a] as f64 / expected[a] as f64;
                     let low = [end(x, 0), end(y, 1), end(z, 2)];
                     let high = [end(x + 1, 0), end(y + 1, 1), end(z + 1, 2)];
-                    // No place is on a voxel's face, and as many are in each part as its size.
+                    // No place is on a voxel's face, and each part has places in proportion to its size.
                     let truth = mean_in(&volume, low, high, dims);
                     assert!((coarse.value(x, y, z) - truth).abs() < 1e-3, "{dims:?} {x} {y} {z}: {truth}");
                 }
@@ -75,7 +75,7 @@ fn what_has_no_value_does_not_count() {
     let mut values = vec![4.0f32; 64];
     values[0] = f32::NAN;
     values[1] = 12.0;
-    // All of the box that ends at the last voxel.
+    // These are all voxels of the box that ends at the last voxel.
     for (x, y, z) in (0..8).map(|i| (2 + i % 2, 2 + i / 2 % 2, 2 + i / 4)) {
         values[x + 4 * (y + 4 * z)] = f32::NAN;
     }

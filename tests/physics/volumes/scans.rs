@@ -14,7 +14,7 @@ fn mri() -> Vec<u8> {
     })
 }
 
-/// A scan that is part of the shared data, `None` where that is not there.
+/// A scan of the shared data; `None` if it is not there.
 fn shared(name: &str) -> Option<Vec<u8>> {
     let path: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data").join(name);
     let bytes = std::fs::read(&path).ok();
@@ -42,7 +42,7 @@ fn the_brain_template_is_read_as_it_is() {
     assert_eq!(map.translation, DVec3::new(-90.5, -108.5, -90.5));
     let kept = volume.file_affine().unwrap();
     assert_eq!([kept[0][3], kept[1][3], kept[2][3]], [-90.0, -125.0, -71.0]);
-    // White matter is the brightest of the brain, and outside of the head there is nothing.
+    // White matter is the brightest part of the brain, and outside the head there is nothing.
     assert!(volume.value(90 + 25, 125 - 20, 71 + 25) > 100.0);
     assert_eq!(volume.value(1, 1, 179), 0.0);
 }
@@ -59,7 +59,7 @@ fn the_angiogram_is_scaled() {
     assert!((volume.spacing()[0] - 0.719_942_57).abs() < 1e-7 && (volume.spacing()[2] - 1.0).abs() < 1e-7);
 }
 
-/// A scan taken at an angle, whose header gives its place twice: as rows and as a quaternion.
+/// A scan that was taken at an angle. Its header gives its place twice: as rows and as a quaternion.
 #[test]
 fn rows_and_quaternion_agree_on_a_rotated_scan() {
     let Some(bytes) = shared("MR_Gd.nii.gz") else { return };

@@ -1,4 +1,4 @@
-//! The store: what it keeps, over restarts too, and what it refuses.
+//! The store: the uploads that it keeps, over restarts too, and those that it refuses.
 
 use crate::common::writers::*;
 use cloudchamber::asset::{AssetLimits, Assets};
@@ -48,7 +48,7 @@ fn the_same_upload_twice_is_one_volume() {
     assert_eq!(files(dir.path()), [format!("{id}.json"), format!("{id}.nii.gz")]);
     assert_eq!(uploads(&store).len(), 1);
 
-    // The same bytes read in another way are another volume.
+    // The same bytes, read in another way, are another volume.
     let wide = RawParams { dims: [8, 1, 1], ..BYTES_2X2X2 };
     let (_, cube_id, _) = store.volumes().insert(vec![5; 8], "cube", Some(BYTES_2X2X2)).unwrap();
     let (row, row_id, new) = store.volumes().insert(vec![5; 8], "row", Some(wide)).unwrap();
@@ -94,7 +94,7 @@ fn what_a_crash_leaves_is_removed_and_nothing_else() {
     let left = files(dir.path());
     assert!(left.contains(&"notes.txt".into()) && left.contains(&format!("{id}.raw")));
     assert!(!left.iter().any(|name| name.contains(orphan)), "{left:?}");
-    // A body that was changed behind the store's back is our fault, not the client's; listing does not read it.
+    // A body that was changed behind the store's back is the server's fault, not the client's. Listing does not read it.
     std::fs::write(dir.path().join("volumes").join(format!("{id}.raw")), b"7 bytes").unwrap();
     assert!(matches!(store.volumes().get(&id), Err(Error::Internal(_))));
     assert!(uploads(&open(dir.path())).is_empty());
@@ -192,7 +192,7 @@ fn builtins_are_listed_unbuilt_and_built_once() {
     assert_eq!(pointer(store.builtin("teapot", 16, 0).map(|_| unreachable!())), "/volume/builtin");
     let info = store.builtin_info("smoke", 16, 1).unwrap();
     assert_eq!(info.reference, serde_json::json!({ "builtin": "smoke", "resolution": 16, "seed": 1 }));
-    // What lists say of a built-in without building it is what the built one says.
+    // The listed description of a built-in that is not built is that of the built one.
     let roomy = Assets::open(dir.path(), AssetLimits { max_resident_bytes: 1 << 30, ..LIMITS }).unwrap();
     let unbuilt = roomy.list_volumes().into_iter().find(|info| info.name == "constant").unwrap();
     let built = VolumeInfo { histogram: None, ..roomy.builtin_info("constant", 128, 0).unwrap() };

@@ -1,4 +1,4 @@
-//! Floats in whole numbers of 16 bits: how far off they are, and which volumes have none.
+//! Floats as whole numbers of 16 bits: their error, and the volumes that have none.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use super::grids::grid;
 use crate::common::writers::*;
 use cloudchamber::volume::{Volume, Voxels};
 
-/// Floats that no word meets, from 1e-6 to 1 of `scale`.
+/// Floats that lie on no word, from 1e-6 to 1 of `scale`.
 fn floats(dims: [usize; 3], scale: f32) -> Vec<f32> {
     let mut random = Random(9);
     (0..dims.iter().product()).map(|_| scale * (random.next() % 999_983) as f32 / 999_983.0).collect()

@@ -1,4 +1,4 @@
-//! What stops a render, what silence means, and that results do not depend on the weather.
+//! The ends of renders, the default budget, and results that do not depend on the machine's load.
 
 use serde_json::{Value, json};
 
@@ -18,7 +18,7 @@ async fn time_stops_a_render() {
     let server = shared();
     let resource = Api::new(&server).finish(&with(endless(), "/budget/time_ms", json!(50))).await;
     assert_eq!(resource["stopped_by"], "time");
-    // At full resolution all the same, and the time was used.
+    // The resolution is full all the same, and the time was used.
     assert!(resource["samples"].as_u64() >= Some(1) && resource["samples"].as_u64() < Some(65536));
     assert_eq!(resource["trace"].as_array().unwrap().last().unwrap()["stride"], 1);
     assert!(resource["timings"]["elapsed_ms"].as_f64() >= Some(50.0));
@@ -80,7 +80,7 @@ async fn the_same_request_gives_the_same_bytes_under_load_and_with_one_thread_or
         assert_eq!(two.png(&body).await, png, "one thread and two: {body}");
         pictures.push(png);
     }
-    // Now with other renders taking turns between its slices.
+    // Now other renders take turns between its slices.
     let others = [two.start(&endless()).await, two.start(&endless()).await];
     for (body, png) in requests().iter().zip(&pictures) {
         assert_eq!(&two.png(body).await, png, "under load: {body}");
@@ -88,7 +88,7 @@ async fn the_same_request_gives_the_same_bytes_under_load_and_with_one_thread_or
     for path in others {
         two.delete(&path).await;
     }
-    // And it is not the same for want of randomness.
+    // Randomness is in use, so another seed gives another picture.
     let reseeded = with(requests()[0].clone(), "/seed", json!(8));
     assert_ne!(pixels(&one.png(&reseeded).await).2, pixels(&pictures[0]).2);
     let reseeded = with(requests()[1].clone(), "/volume/photon_transport/seed", json!(6));

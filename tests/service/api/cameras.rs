@@ -6,7 +6,7 @@ use crate::support::*;
 
 const FROM_ABOVE: [f64; 3] = [0.3, 4.0, 0.5];
 
-/// The request with that camera in the first place.
+/// The small request with a camera at `eye`.
 fn seen_from(eye: [f64; 3]) -> Value {
     with(small(), "/camera", json!({"eye": eye}))
 }
@@ -59,7 +59,7 @@ async fn the_newest_of_many_cameras_wins() {
     api.until_state(&path, "done").await;
 }
 
-/// The stream that a render was posted for is at its end: that must not count as its client going away.
+/// The stream of a posted render is at its end, which must not count as its client going away.
 #[tokio::test]
 async fn a_render_posted_as_a_stream_takes_a_camera_after_its_end() {
     let server = shared();
@@ -77,7 +77,7 @@ async fn deleting_a_done_render_does_not_leave_its_next_camera_waiting_for_ever(
     let api = Api::new(&server);
     let path = api.finish(&small()).await["links"]["self"].as_str().unwrap().to_owned();
     assert_eq!(api.delete(&path).await.status(), 200);
-    // Refused or rendered: both are right, waiting is not.
+    // A refusal and a picture are both right; to wait is not.
     if api.put(&format!("{path}/camera"), &json!({"eye": FROM_ABOVE})).await.status() == 200 {
         api.until_state(&path, "done").await;
     }
@@ -107,7 +107,7 @@ async fn a_bad_camera_is_refused_by_name_and_the_render_goes_on() {
 async fn a_matrix_and_a_point_say_the_same_camera() {
     let server = shared();
     let api = Api::new(&server);
-    // three.js: an object at (0, 0, 5) that is not rotated looks along -z.
+    // In three.js, an object at (0, 0, 5) that is not rotated looks along -z.
     let matrix = json!([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 5, 1]);
     let by_matrix = api.png(&with(small(), "/camera/camera_to_world", matrix)).await;
     let by_point =
@@ -128,7 +128,7 @@ async fn a_simulation_is_looked_at_while_it_fills_and_its_grid_is_a_nrrd() {
     let resource = api.finish(&body).await;
     assert_eq!(resource["result"]["photons"], 50_000);
     let ledger = resource["result"]["ledger"].as_object().unwrap();
-    // What leaves unscattered is a part of what leaves.
+    // The light that leaves unscattered is a part of all light that leaves.
     let parts = ledger.iter().filter(|(name, _)| !name.starts_with("unscattered"));
     let sum: f64 = parts.map(|(_, e)| e["value"].as_f64().unwrap()).sum();
     assert!((sum - 1.0).abs() < 1e-6, "every photon is somewhere: {ledger:?}");
@@ -142,14 +142,14 @@ async fn a_simulation_is_looked_at_while_it_fills_and_its_grid_is_a_nrrd() {
     let grid = cloudchamber::volume::read(&bytes, "field", None, &limits).unwrap();
     assert_eq!(grid.dims(), [20, 16, 12]);
     assert!(grid.range()[0] >= 0.0 && grid.range()[1] > 0.0 && grid.range()[1].is_finite());
-    // What comes out can be put in: the grid is a volume like any other.
+    // An output can be an input: the grid is a volume like any other.
     let uploaded: Value = api.upload("", bytes.to_vec()).await.json().await.unwrap();
     assert_eq!(uploaded["dims"], json!([20, 16, 12]));
     let plain = api.finish(&small()).await;
     problem(api.get(plain["links"]["field"].as_str().unwrap()).await, 404, "the field of a render without one").await;
 }
 
-/// A picture that takes long: the first frames of a moving camera have less of it and say so, the ones at rest do not.
+/// The picture takes long. The first frames of a moving camera have reduced quality and say so, and those at rest do not.
 #[tokio::test]
 async fn a_frame_in_motion_says_what_was_lowered_and_one_at_rest_has_it_all() {
     let server = shared();

@@ -115,7 +115,7 @@ fn device_lists_the_variants_of_every_kernel() {
     for kernel in ["emission_absorption", "volume_path", "photon_transport", "isosurface"] {
         let of: Vec<&Value> = variants.iter().filter(|v| v["kernel"] == kernel).collect();
         let options = of[0]["options"].as_str().unwrap();
-        // In service a compiler's warning takes nothing away.
+        // In service, a compiler's warning disables nothing.
         assert!(options.contains("-DLANES=") && !options.contains("-Werror"), "{kernel}: {options}");
         assert!(of.iter().any(|v| v["at_start"] == true), "{kernel}");
     }

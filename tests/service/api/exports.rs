@@ -1,4 +1,4 @@
-//! `/v1/exports`: post, follow, fetch the file, cancel, and what is refused; and `export` on the command line.
+//! `/v1/exports`: post, follow, fetch the file, cancel, and refused requests; and `export` on the command line.
 
 use std::process::Command;
 

@@ -1,4 +1,4 @@
-//! What the service tells of itself: techniques, device, health, metrics, viewer, and who may come in.
+//! The service's information about itself: techniques, device, health, metrics, viewer, and access.
 
 use serde_json::{Value, json};
 
@@ -73,7 +73,7 @@ async fn the_device_is_told() {
 async fn health_and_readiness_are_told_apart() {
     let server = Server::spawn(&[]);
     let api = Api::new(&server);
-    // It lives before it is ready; whether readiness is still to come depends on the kernel cache.
+    // The process is alive before it is ready. The kernel cache decides if readiness is still to come.
     assert_eq!(api.get("/healthz").await.status(), 200);
     let early = api.get("/readyz").await;
     if early.status() != 200 {
@@ -86,7 +86,7 @@ async fn health_and_readiness_are_told_apart() {
     }
 }
 
-/// The value of the first line that starts with `name` and holds every one of `labels`.
+/// The value of the first line that starts with `name` and has every one of `labels`.
 fn metric(text: &str, name: &str, labels: &[&str]) -> f64 {
     let line = text.lines().find(|l| l.starts_with(name) && labels.iter().all(|label| l.contains(label)));
     let line = line.unwrap_or_else(|| panic!("no {name} {labels:?} in\n{text}"));
@@ -136,7 +136,7 @@ async fn the_viewer_is_served_with_a_strict_policy() {
     assert!(policy.contains("default-src 'self'") && !policy.contains("unsafe"), "{policy}");
     let html = page.text().await.unwrap();
     assert!(!html.contains("://cdn"), "nothing comes from elsewhere");
-    // Every local file that the page names is there, with a type that a browser takes.
+    // Every local file that the page names is there, with a media type for browsers.
     for (attribute, kind) in [("src=\"", "text/javascript"), ("href=\"", "")] {
         for rest in html.split(attribute).skip(1) {
             let file = rest.split('"').next().unwrap().trim_start_matches(['.', '/']);
@@ -195,7 +195,7 @@ async fn origins_are_let_in_only_by_name() {
     assert_eq!(origin(&ask(&api).await.unwrap()).unwrap(), "https://example.org");
     let other = api.request(reqwest::Method::GET, "/healthz").header("Origin", "https://evil.example").send();
     assert_ne!(origin(&other.await.unwrap()), Some("https://evil.example".parse().unwrap()));
-    // A browser's preflight carries no token and must pass.
+    // A browser's preflight carries no token and must be admitted.
     let preflight = api.request(reqwest::Method::OPTIONS, "/v1/renders").header("Origin", "https://example.org");
     let preflight = preflight.header("Access-Control-Request-Method", "POST");
     let preflight = preflight

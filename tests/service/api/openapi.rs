@@ -1,4 +1,4 @@
-//! `/openapi.json` and `/docs/`: the document is well formed, and it and the routes say the same.
+//! `/openapi.json` and `/docs/`: the document is well formed, and it agrees with the routes.
 
 use std::collections::BTreeSet;
 
@@ -9,7 +9,7 @@ use crate::support::*;
 
 const METHODS: [&str; 4] = ["get", "post", "put", "delete"];
 
-/// Method and path of every route in the source. `/docs` describes itself.
+/// The method and path of every route in the source. `/docs` describes itself.
 fn routes() -> BTreeSet<(String, String)> {
     let source = include_str!("../../../src/http/routes.rs");
     let mut routes = BTreeSet::new();

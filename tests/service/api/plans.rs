@@ -83,7 +83,7 @@ async fn a_plan_says_what_the_scene_is_like() {
         "emission_absorption": {"transfer_function": {"points": wall}}});
     let opaque = plan(&api, &body).await;
     let features = &opaque["features"];
-    // 400 per unit of value, over a range of almost 1 and a voxel of 2 / 64.
+    // The slope is 400 per unit of value, over a range of almost 1 and a voxel of 2 / 64.
     let slope = features["steepest_slope"].as_f64().unwrap();
     assert!((slope / 12.5 - 1.0).abs() < 0.05, "{slope}");
     assert!(features["opaque"].as_f64().is_some_and(|part| part > 0.1 && part < 0.9), "{features}");
@@ -95,7 +95,7 @@ async fn a_plan_says_what_the_scene_is_like() {
 async fn an_automatic_render_is_planned_rendered_and_explained() {
     let server = shared();
     let api = Api::new(&server);
-    // A size that no other test here asks for.
+    // No other test here asks for this size.
     let body = with(fog(5.0, 0.9, &json!({"max_error": 0.05})), "/image", json!({"width": 97, "height": 61}));
     let rendered = api.png(&body);
     tokio::pin!(rendered);
@@ -110,7 +110,7 @@ async fn an_automatic_render_is_planned_rendered_and_explained() {
         }
     };
     assert!(colours(&picture) > 20);
-    // Pilots have pictures of the same size, and are not renders of anybody's.
+    // Pilots have pictures of the same size, and are not listed as renders.
     assert!(seen.len() <= 1, "{seen:?}");
     let done = api.finish(&body).await;
     assert!(done["error"].as_f64().is_some_and(|e| e <= 0.05), "{}", done["error"]);

@@ -105,7 +105,7 @@ async fn the_resource_tells_plan_samples_error_timings_and_trace() {
     assert_eq!(resource["plan"]["budget"]["samples"], 9);
     let reasons = resource["plan"]["reasons"].as_array().unwrap();
     assert!(reasons.iter().any(|r| r.as_str().unwrap().contains("ramp")), "the default is named: {reasons:?}");
-    // The parts are what the total is made of: the root of the sum of their squares.
+    // The parts make up the total: the root of the sum of their squares.
     let error = resource["error"].as_f64().unwrap();
     let parts = resource["error_parts"].as_object().unwrap();
     assert_eq!(parts["total"], resource["error"]);
@@ -151,7 +151,7 @@ async fn frame_png_has_a_strong_tag_and_answers_304_to_who_has_it() {
     let api = Api::new(&server);
     let path = api.start(&small()).await;
     let frame = format!("{path}/frame.png");
-    // ?wait=final blocks until the render is done: asked for at once, it is the last frame.
+    // ?wait=final blocks until the render is done. Asked for at once, it gives the last frame.
     let response = api.get(&format!("{frame}?wait=final")).await;
     assert_eq!(response.status(), 200);
     check_frame_headers(response.headers(), "4");
@@ -166,7 +166,7 @@ async fn frame_png_has_a_strong_tag_and_answers_304_to_who_has_it() {
         assert_eq!(response.headers()["etag"], etag);
         assert_eq!(response.bytes().await.unwrap().is_empty(), status == 304);
     }
-    // The tag is of what determines the bytes, not of the render: another render of the same request has the same one.
+    // The tag depends on the inputs of the bytes, not on the render: another render of the same request has the same tag.
     let other = api.post(&small(), "image/png").await;
     assert_eq!(other.headers()["etag"], etag);
 }
@@ -203,7 +203,7 @@ async fn events_tell_progress_and_the_end_and_resume_where_a_client_left() {
     assert!(events_seen.windows(2).all(|w| w[0].1 < w[1].1), "ids rise");
     assert!(events_seen.windows(2).all(|w| w[0].2["samples"].as_u64() <= w[1].2["samples"].as_u64()));
     assert_eq!(last.2["samples"], api.get_json(&path).await["samples"]);
-    // Who saw an earlier event is told of the end only; who comes anew likewise: the latest is what counts.
+    // A client that saw an earlier event is told only of the end, and so is a new client, since only the latest event counts.
     for seen in [before[0].1.to_string(), "0".into()] {
         let again = api.request(Method::GET, &format!("{path}/events")).header("Last-Event-ID", &seen);
         let again = events(&again.send().await.unwrap().text().await.unwrap());
@@ -250,7 +250,7 @@ async fn delete_cancels_and_leaves_the_resource_readable() {
     assert_eq!(api.get_json(&path).await["state"], "cancelled");
     assert_eq!(api.delete(&path).await.status(), 200, "once more changes nothing");
     problem(api.get(&format!("{path}/frame.png?wait=final")).await, 409, "the last frame of a cancelled render").await;
-    // A render that is done stays done.
+    // A done render stays done.
     let done = api.finish(&small()).await;
     let path = done["links"]["self"].as_str().unwrap();
     assert_eq!(api.delete(path).await.json::<Value>().await.unwrap()["state"], "done");
@@ -271,7 +271,7 @@ async fn an_idempotency_key_makes_one_render() {
     problem(post(with(small(), "/seed", json!(1))).await.unwrap(), 409, "another body under the same key").await;
     let other = api.request(Method::POST, "/v1/renders").header("Idempotency-Key", "twice").json(&small());
     assert_ne!(id(other.send().await.unwrap().json().await.unwrap()), first);
-    // A client that retries before the first answer came.
+    // The client retries before the first answer comes.
     let hasty = || api.request(Method::POST, "/v1/renders").header("Idempotency-Key", "hasty").json(&small()).send();
     let answers = futures_util::future::join_all((0..8).map(|_| hasty())).await;
     let mut ids = std::collections::HashSet::new();

@@ -1,4 +1,4 @@
-//! Scenes of scattered light over HTTP: what they share, their mistakes, and the map of the difference of two of them.
+//! Scenes of scattered light over HTTP: their shared sections, their mistakes, and the map of the difference of two of them.
 
 use serde_json::{Value, json};
 
@@ -37,7 +37,7 @@ async fn two_techniques_are_compared_in_a_picture_with_a_p_value() {
     let png = same.bytes().await.unwrap();
     assert_eq!(pixels(&png).0, 40);
     assert_eq!(description(&png)["agree"], true);
-    // What single scattering leaves out is found.
+    // The light that single scattering leaves out is found.
     let response =
         api.request(reqwest::Method::GET, &path(&many)).header("Accept", "application/json").send().await.unwrap();
     let differs: Value = response.json().await.unwrap();

@@ -8,7 +8,7 @@ use crate::support::*;
 
 #[tokio::test]
 async fn the_mri_head_is_uploaded_once_shown_rendered_and_deleted() {
-    // A server of its own: it must not know the scan yet.
+    // The test has a server of its own, which must not know the scan yet.
     let server = Server::start();
     let api = Api::new(&server);
     let post = || {

@@ -15,7 +15,7 @@ async fn text(api: &Api, body: impl Into<reqwest::Body>) -> reqwest::Response {
     request.body(body).send().await.unwrap()
 }
 
-/// Every broken JSON, on any server.
+/// Posts all broken JSON to a server.
 pub async fn broken_json(server: &Server) {
     let api = Api::new(server);
     let deep_arrays = "[".repeat(100_000);
@@ -81,7 +81,7 @@ async fn streamed_bodies_past_the_limit_are_413_when_they_pass_it() {
         assert_eq!(status, 413, "{body}");
         check_problem(status, &kind, &body, path);
     }
-    // At the limit it is read, and is wrong for another reason.
+    // A body at the limit is read, and is wrong for another reason.
     let api = Api::new(&server);
     problem(text(&api, vec![b' '; 1 << 20]).await, 400, "blanks up to the limit").await;
 }
@@ -137,7 +137,7 @@ async fn bodies_that_break_off_harm_nobody() {
 async fn a_full_body_of_legal_but_absurd_json_is_refused_quickly() {
     let server = shared();
     let api = Api::new(&server);
-    // A megabyte of unknown fields, of points, of numbers: each within the limit of bytes.
+    // The bodies have a megabyte of unknown fields, of points, or of numbers, each within the limit of bytes.
     let fields: serde_json::Map<_, _> = (0..40_000).map(|i| (format!("field{i}"), json!(i))).collect();
     let many = serde_json::Value::Object(fields);
     let told =

@@ -1,4 +1,4 @@
-//! Cameras that are none.
+//! Invalid cameras.
 
 use serde_json::{Value, json};
 
@@ -53,7 +53,7 @@ fn cases() -> Vec<(&'static str, Value, &'static str)> {
     ]
 }
 
-/// Every one of them, on any server, with a render and with a new camera for one.
+/// Sends every invalid camera to a server, in a render and as a new camera for one.
 pub async fn refused_by_name(server: &Server) {
     let api = Api::new(server);
     let path = api.finish(&small()).await["links"]["camera"].as_str().unwrap().to_owned();
@@ -81,7 +81,7 @@ async fn every_bad_camera_is_refused_by_name() {
     refused_by_name(&shared()).await;
 }
 
-/// JSON has no NaN and no infinity; numbers past a double's range are none either.
+/// JSON has no NaN and no infinity, and numbers past a double's range are no numbers either.
 #[tokio::test]
 async fn numbers_that_are_none_are_refused() {
     let server = shared();
@@ -93,7 +93,7 @@ async fn numbers_that_are_none_are_refused() {
     }
 }
 
-/// What is odd but right renders, finite everywhere.
+/// An odd but valid camera gives a picture that is finite everywhere.
 #[tokio::test]
 async fn odd_cameras_render_finite_pictures() {
     let server = shared();

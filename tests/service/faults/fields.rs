@@ -1,4 +1,4 @@
-//! Requests that are JSON and mean nothing: each names the field and what is permitted there.
+//! Requests that are JSON and mean nothing. Each refusal names the field and its permitted values.
 
 use serde_json::{Value, json};
 
@@ -12,7 +12,7 @@ fn point(value: f64, opacity: f64) -> Value {
     json!({"value": value, "color": [0.5, 0.5, 0.5], "opacity_per_unit": opacity})
 }
 
-/// `(where to put it, what, the pointer that is expected)`, the pointer being the place itself where empty.
+/// `(place, value, expected pointer)`. An empty pointer is the place itself.
 fn cases() -> Vec<(&'static str, Value, &'static str)> {
     vec![
         // An unknown field at each level.
@@ -94,7 +94,7 @@ fn cases() -> Vec<(&'static str, Value, &'static str)> {
             json!({"preset": "ramp", "points": [point(0.0, 1.0)]}),
             "/emission_absorption/transfer_function/points",
         ),
-        // Volumes that are not there.
+        // Volumes that do not exist.
         ("/volume", json!({}), ""),
         ("/volume", json!({"builtin": "smoke", "id": "x"}), ""),
         ("/volume", json!({"builtin": "smoke", "photon_transport": {}}), ""),
@@ -170,7 +170,7 @@ fn cases() -> Vec<(&'static str, Value, &'static str)> {
     ]
 }
 
-/// Every one of them, on any server.
+/// Posts every case to a server, which must name its field.
 pub async fn refused_by_name(server: &Server) {
     let api = Api::new(server);
     let mut wrong = Vec::new();
@@ -230,7 +230,7 @@ async fn ranges_are_told_as_ranges() {
     }
 }
 
-/// JSON has one kind of number: where a schema says integer, 4.0 is one (JSON Schema, 6.3).
+/// JSON has one kind of number. If a schema says integer, 4.0 is one (JSON Schema, 6.3).
 #[tokio::test]
 async fn whole_numbers_written_as_floats_are_taken_or_refused_by_name() {
     let server = shared();
@@ -275,7 +275,7 @@ async fn limits_of_the_configuration_are_the_ones_that_are_kept_and_told() {
         let told = problem(api.post(&with(small(), place, value), "image/png").await, 422, place).await;
         assert!(told["errors"][0]["permitted"].as_str().unwrap().contains(permitted), "{place}: {told}");
     }
-    // What silence means must lie within the limits.
+    // The defaults must lie within the limits.
     let silent = api.post(&json!({"technique": "emission_absorption"}), "image/png").await;
     assert_eq!(silent.status(), 200, "{}", silent.text().await.unwrap());
     let simulated =

@@ -1,4 +1,4 @@
-//! Films stay on the device until they are asked for: of the newest renders, within a limit.
+//! Films stay on the device until they are asked for: those of the newest renders, within a limit.
 
 use serde_json::{Value, json};
 

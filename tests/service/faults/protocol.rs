@@ -1,4 +1,4 @@
-//! Paths, methods, media types: what goes wrong before a body is read.
+//! Paths, methods, media types: the faults before a body is read.
 
 use reqwest::Method;
 use serde_json::{Value, json};
@@ -80,7 +80,7 @@ async fn answers_that_cannot_be_made_are_406() {
     }
 }
 
-/// Posts bytes with that content type, if any.
+/// Posts bytes with a content type, if one is given.
 async fn typed(api: &Api, path: &str, content_type: Option<&str>, body: &str) -> reqwest::Response {
     let request = api.request(Method::POST, path).body(body.to_owned());
     content_type.map_or(request.try_clone().unwrap(), |t| request.header("Content-Type", t)).send().await.unwrap()
@@ -116,7 +116,7 @@ async fn bad_queries_are_refused_by_name() {
     }
 }
 
-/// Over a bare socket, since a client library would tidy the path up.
+/// The request goes over a bare socket, since a client library would tidy the path up.
 #[test]
 fn no_path_leads_out_of_the_viewers_folder() {
     let folder = tempfile::tempdir().unwrap();

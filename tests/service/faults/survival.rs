@@ -1,4 +1,4 @@
-//! After all of it the server renders as before, and its memory is what it was.
+//! After all faults the server renders as before, and its memory is as before.
 
 use std::time::{Duration, Instant};
 
@@ -12,13 +12,13 @@ async fn after_every_fault_the_server_renders_and_its_memory_is_what_it_was() {
     let api = Api::new(&server);
     let picture = api.png(&small()).await;
     let before = server.resident_bytes();
-    // Twice: what is paid once (an allocator's arenas) is not what is lost each time.
+    // The faults come twice: a cost that is paid once (an allocator's arenas) is not lost each time.
     for _ in 0..2 {
         bodies::broken_json(&server).await;
         fields::refused_by_name(&server).await;
         cameras::refused_by_name(&server).await;
         voxels::refused(&server).await;
-        // Half sent and left: 20 announced gigabytes of which one megabyte comes.
+        // The uploads break off: each announces a gigabyte and sends a megabyte, twenty times.
         for _ in 0..20 {
             let head = "POST /v1/volumes HTTP/1.1\r\nHost: x\r\nContent-Length: 1000000000\r\n\r\n";
             let mut socket = std::net::TcpStream::connect(server.address()).unwrap();

@@ -1,4 +1,4 @@
-//! Uploads that lie, end early or explode, over HTTP; and volumes with voxels that are no numbers.
+//! Uploads that lie, end early or explode, over HTTP; and volumes with voxels that are NaN or infinite.
 
 use cloudchamber::volume::RawType;
 use serde_json::{Value, json};
@@ -82,7 +82,7 @@ fn cases() -> Vec<(&'static str, &'static str, Vec<u8>, &'static [u16])> {
     ]
 }
 
-/// Every one of them, on any server.
+/// Uploads every case to a server, which must refuse it.
 pub async fn refused(server: &Server) {
     let api = Api::new(server);
     for (about, query, body, permitted) in cases() {
@@ -145,7 +145,7 @@ async fn voxels_that_are_no_numbers_are_counted_and_rendered_as_empty() {
         let warned = resource["warnings"].as_array().unwrap().iter().any(|w| w["code"] == "non_finite_voxels");
         assert!(warned, "{}", resource["warnings"]);
     }
-    // Of nothing but such voxels there is nothing to see, and no fault.
+    // A volume of such voxels alone shows nothing, which is no fault.
     let nothing: Vec<u8> = [f32::NAN; 64].iter().flat_map(|v| v.to_le_bytes()).collect();
     let response = api.upload("?dims=4,4,4&type=f32", nothing).await;
     if response.status() == 201 {

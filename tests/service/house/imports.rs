@@ -1,4 +1,4 @@
-//! Who uses whom in `src`: every path of every file, whatever the form of its `use`, resolved to the file that it leads to.
+//! The uses among the modules of `src`: every path of every file, whatever the form of its `use`, resolved to the file that it leads to.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -8,23 +8,23 @@ use proc_macro2::{Delimiter, TokenStream, TokenTree};
 /// A file as the path of its module: `["job", "engine"]`.
 pub type Module = Vec<String>;
 
-/// The modules and whom each uses, beside tests.
+/// The modules that each module uses, beside tests.
 pub struct Imports {
     pub uses: BTreeMap<Module, BTreeSet<Module>>,
 }
 
-/// What a file says: the paths that it uses, and those that it gives another name or hands on.
+/// The paths that a file uses, and those that it renames or re-exports.
 #[derive(Default)]
 struct Said {
     uses: Vec<Vec<String>>,
-    /// Names that a `use` brings into the file, and what they stand for.
+    /// The names that a `use` brings into the file, with their paths.
     names: BTreeMap<String, Vec<String>>,
-    /// The same of a `pub use`.
+    /// The names of a `pub use`, with their paths.
     handed_on: BTreeMap<String, Vec<String>>,
 }
 
 impl Imports {
-    /// Those of all files below `src`.
+    /// The uses of all files below `src`.
     pub fn of(src: &Path) -> Self {
         let mut said = BTreeMap::new();
         for path in super::files(src, "rs") {
@@ -47,8 +47,8 @@ impl Imports {
         Self { uses: said.keys().map(resolve).collect() }
     }
 
-    /// Circles: modules of one folder that use each other, directly or not, with all that is below them. That a folder's own file uses what is
-    /// in the folder, and the other way round, is no circle.
+    /// Circles: modules of one folder that use each other, directly or not, with all that is below them. It is no circle if a folder's own file
+    /// uses files in the folder, or the other way round.
     pub fn circles(&self) -> Vec<Vec<String>> {
         let folders: BTreeSet<&[String]> = self.uses.keys().flat_map(|m| (0..m.len()).map(|n| &m[..n])).collect();
         folders.into_iter().flat_map(|folder| self.circles_in(folder)).collect()
@@ -85,7 +85,7 @@ fn module(file: &Path) -> Module {
     parts
 }
 
-/// A path from the root of the crate; none of a path that leads out of it.
+/// A path from the root of the crate; `None` for a path that leads out of it.
 fn absolute(module: &Module, path: &[String], said: &BTreeMap<Module, Said>) -> Option<Vec<String>> {
     let supers = path.iter().take_while(|part| *part == "super").count();
     let below = |base: &[String], rest: &[String]| Some([base, rest].concat());
@@ -104,7 +104,7 @@ fn absolute(module: &Module, path: &[String], said: &BTreeMap<Module, Said>) -> 
     }
 }
 
-/// The file that a path from the root leads to, through whatever hands its last part on.
+/// The file that a path from the root leads to, through all re-exports of its last part.
 fn resolve(path: Vec<String>, said: &BTreeMap<Module, Said>) -> Option<Module> {
     let length = (1..=path.len()).rev().find(|n| said.contains_key(&path[..*n]))?;
     let (module, rest) = (path[..length].to_vec(), &path[length..]);
@@ -114,7 +114,7 @@ fn resolve(path: Vec<String>, said: &BTreeMap<Module, Said>) -> Option<Module> {
 }
 
 impl Said {
-    /// Reads a file's tokens: comments and texts are none.
+    /// Reads a file's tokens. Comments and texts are no tokens of paths.
     fn read(&mut self, tokens: TokenStream) {
         let tokens: Vec<TokenTree> = tokens.into_iter().collect();
         let word = |i: usize| tokens.get(i).map(ToString::to_string).unwrap_or_default();
@@ -136,7 +136,7 @@ impl Said {
         }
     }
 
-    /// Reads a path such as `film::Film::new`, and says how many tokens it has.
+    /// Reads a path such as `film::Film::new`, and returns the number of its tokens.
     fn read_path(&mut self, tokens: &[TokenTree]) -> usize {
         let mut path = Vec::new();
         let mut at = 0;

@@ -1,4 +1,4 @@
-//! Who reads frames: to the end, many at once, or not at all.
+//! The readers of frames: to the end, many at once, or not at all.
 
 use std::io::Write;
 use std::net::TcpStream;
@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use crate::common::Server;
 use crate::support::*;
 
-/// A render of about so long, with pictures that do not compress to nothing.
+/// A render of about `time_ms`, with pictures that hardly compress.
 fn lasting_ms(time_ms: u64, side: u32) -> Value {
     json!({
         "technique": "emission_absorption", "volume": {"builtin": "smoke", "resolution": 64},
@@ -38,7 +38,7 @@ async fn frames_have_their_headers_never_fall_and_end_with_the_final_one() {
         assert!(parts.windows(2).all(|w| w[0].number(name) <= w[1].number(name)), "{name} falls");
     }
     assert_eq!(last.body, api.get(&format!("{path}/frame.png")).await.bytes().await.unwrap());
-    // Who comes when all is over gets the final frame, and the end.
+    // A reader who comes when all is over gets the final frame, and the end.
     let (late, closed) = all_parts(api.get(&format!("{path}/frames")).await).await;
     assert!(closed && late.len() == 1 && late[0].body == last.body);
 }
@@ -59,7 +59,7 @@ async fn the_first_frame_comes_long_before_the_last() {
     let mut stream = api.post(&endless(), "multipart/x-mixed-replace").await.bytes_stream();
     let mut bytes = Vec::new();
     let mut parts = Vec::new();
-    // A part must be whole, with the boundary behind it, as soon as it is there: a browser shows it only then.
+    // A part must be complete, with the boundary behind it, as soon as it is there, since a browser shows it only then.
     while parts.len() < 2 {
         bytes.extend_from_slice(&stream.next().await.unwrap().unwrap());
         parts.extend(take_parts(&mut bytes).0);
@@ -96,8 +96,8 @@ async fn clients_that_stop_reading_cost_no_growing_memory_and_delay_nobody() {
             }
         }
     }
-    // Were frames kept for each reader, 60 of them would be held 48 times. What is bounded by the number of readers alone (the
-    // frame in hand, the socket's buffers) had its place before the tenth frame; the allowance is a tenth of the leak.
+    // A server that keeps frames for each reader would hold 60 of them 48 times. The memory that is bounded by the number of readers alone (the
+    // frame in hand, the socket's buffers) was taken before the tenth frame. The allowance is a tenth of the leak.
     let growth = server.resident_bytes().saturating_sub(before);
     let leak = (size / frames * 60 * STALLED) as u64;
     assert!(leak > 100 << 20, "the pictures are too small to tell: {leak} bytes");
@@ -137,7 +137,7 @@ async fn streams_past_the_limit_are_refused_and_the_places_come_back() {
     let refused = api.get(&format!("{path}/events")).await;
     assert!(refused.headers()["retry-after"].to_str().unwrap().parse::<u64>().unwrap() >= 1);
     problem(refused, 429, "a fourth stream").await;
-    // A render whose stream cannot be had must not run on for nobody.
+    // A render without its stream must not run on for nobody.
     problem(api.post(&small(), "multipart/x-mixed-replace").await, 429, "a render with a fourth stream").await;
     problem(api.post(&small(), "image/png").await, 429, "a render that waits").await;
     let left = api.get_json("/v1/renders").await;

@@ -10,7 +10,7 @@ use serde_json::json;
 use crate::common::Server;
 use crate::support::*;
 
-/// The exit code, or a failure when the server does not end in time: waiting for a process that hangs would hang too.
+/// The exit code. It fails if the server does not end in time, since a wait for a hanging process would hang too.
 fn exit_code(server: &mut Server) -> Option<i32> {
     let started = Instant::now();
     let stat = format!("/proc/{}/stat", server.pid());
@@ -18,7 +18,7 @@ fn exit_code(server: &mut Server) -> Option<i32> {
         assert!(started.elapsed() < PATIENCE, "the server does not end");
         std::thread::sleep(Duration::from_millis(20));
     }
-    // The wait status, whose low byte is the signal that killed it.
+    // The wait status has the signal that killed the process in its low byte.
     let status = std::fs::read_to_string(&stat).unwrap().trim().rsplit(' ').next().unwrap().to_owned();
     println!("wait status {status}");
     server.wait()

@@ -1,4 +1,4 @@
-//! The queue and the turns on the device: full, fair, cancelled.
+//! The queue and the turns on the device: a full queue, fair turns, cancelled renders.
 
 use std::time::Instant;
 
@@ -12,7 +12,7 @@ async fn of_a_hundred_renders_the_65th_is_the_first_refused_and_all_comes_back()
     let server = Server::start();
     let api = Api::new(&server);
     let large = with(endless(), "/image", json!({"width": 512, "height": 512}));
-    // Warm: volume, buffers and threads are there before memory is measured.
+    // The server is warm: volume, buffers and threads are there before memory is measured.
     let path = api.start(&large).await;
     api.until(&path, "visible", |r| r["samples"].as_u64() >= Some(1)).await;
     api.delete(&path).await;
@@ -32,7 +32,7 @@ async fn of_a_hundred_renders_the_65th_is_the_first_refused_and_all_comes_back()
     }
     problem(api.get("/readyz").await, 503, "ready with a full queue").await;
     assert_eq!(api.get("/healthz").await.status(), 200, "full is not ill");
-    // A bad request is told so whether there is room or not, or is told that there is none: never anything else.
+    // A bad request is told its fault, or that there is no room, and never anything else.
     let refused = api.post(&json!({"technique": "none"}), "image/png").await.status().as_u16();
     assert!([422, 429].contains(&refused), "{refused}");
 
@@ -45,8 +45,8 @@ async fn of_a_hundred_renders_the_65th_is_the_first_refused_and_all_comes_back()
         tokio::time::sleep(std::time::Duration::from_millis(10)).await;
     }
     api.png(&small()).await;
-    // A cancelled render's newest picture stays readable, so the eight that had turns keep 8 MiB each; the buffers of
-    // the device and what the 56 others would have taken must be gone.
+    // A cancelled render's newest picture stays readable, so the eight with turns keep 8 MiB each. The buffers of the device and the memory of the
+    // 56 others must be gone.
     let growth = server.resident_bytes().saturating_sub(before);
     assert!(growth < 160 << 20, "{} MiB more than before", growth >> 20);
 }
@@ -96,7 +96,7 @@ async fn short_renders_finish_while_long_ones_run() {
         let resource = api.get_json(path).await;
         assert_eq!(resource["state"], "running");
         let samples = resource["samples"].as_u64();
-        // And the long ones all go on: nobody starves.
+        // The long renders all go on, so nobody starves.
         api.until(path, "further on", |r| r["samples"].as_u64() > samples).await;
     }
     for path in &long {
@@ -112,7 +112,7 @@ async fn equal_renders_get_equal_shares_of_the_device() {
     let device_ms = |r: &Value| r["timings"]["device_ms"].as_f64().unwrap();
     api.until(&first, "a while on", |r| device_ms(r) > 1500.0).await;
     let (a, b) = (device_ms(&api.get_json(&first).await), device_ms(&api.get_json(&second).await));
-    // Round robin would give 1; a frame's worth of time and a slow machine's noise are far within 3.
+    // Round robin would give 1. A frame's worth of time and a slow machine's noise are far within 3.
     assert!(a / b < 3.0 && b / a < 3.0, "{a} ms and {b} ms of device time");
 }
 
@@ -132,8 +132,8 @@ async fn the_device_is_free_soon_after_a_cancel() {
         let ended = api.get_json(&path).await;
         assert_eq!((&ended["state"], &ended["stopped_by"]), (&json!("cancelled"), &json!(null)));
     }
-    // The next render's own account of how long it waited for the device: 100 ms are promised. Whoever else works on this machine may make
-    // some of the five late; a device that is held makes all of them late.
+    // The next render's own account of its wait for the device: 100 ms are promised. Other work on this machine may make some of the five late, but
+    // a device that is held makes all of them late.
     let least = waits.iter().copied().fold(f64::INFINITY, f64::min);
     assert!(least < 100.0, "waited {waits:?} ms");
 }
@@ -172,7 +172,7 @@ fn endless_work(volume: &Value) -> Vec<Value> {
     ]
 }
 
-/// Whatever a scene asks for, the device is free within 100 ms of a cancel.
+/// The device is free within 100 ms of a cancel, whatever the scene.
 #[tokio::test]
 async fn no_scene_holds_the_device() {
     let server = Server::start();
@@ -192,13 +192,13 @@ async fn no_scene_holds_the_device() {
             let next = api.finish(&small()).await;
             waits.push(next["timings"]["queued_ms"].as_f64().unwrap());
         }
-        // Whoever else works on this machine may make some of them late; a device that is held makes all of them late.
+        // Other work on this machine may make some of them late, but a device that is held makes all of them late.
         let least = waits.iter().copied().fold(f64::INFINITY, f64::min);
         assert!(least < 100.0, "{body}: waited {waits:?} ms");
     }
 }
 
-/// Large fields are made on the device's thread too: their preparation must not hold up others.
+/// Large fields are made on the device's thread too. Their preparation must not hold up others.
 #[tokio::test]
 async fn a_large_simulation_does_not_hold_up_a_small_render() {
     let server = shared();
@@ -215,7 +215,7 @@ async fn a_large_simulation_does_not_hold_up_a_small_render() {
     }
     assert_eq!(api.get_json(&path).await["state"], "running");
     api.delete(&path).await;
-    // Alone it takes some 20 ms. Two seconds are no measure of speed but a sign that somebody held the device.
+    // Alone, it takes some 20 ms. Two seconds are not a measure of speed, but a sign that something held the device.
     assert!(longest < 2000.0, "a render of 64 by 48 pixels took {longest} ms");
 }
 
@@ -233,7 +233,7 @@ async fn cancelled_renders_give_their_place_in_the_queue_back() {
         while api.get("/readyz").await.status() != 200 {
             assert!(started.elapsed() < PATIENCE, "the places never come back");
         }
-        // Deleted twice must not give two places back: two fit, a third does not, in the next round.
+        // A second delete must not give a second place back: in the next round two renders fit, and a third does not.
         tokio::time::sleep(std::time::Duration::from_millis(50)).await;
     }
 }

@@ -14,20 +14,20 @@ use serde_json::{Value, json};
 use tempfile::TempDir;
 
 pub const CHROMEDRIVER: &str = "chromedriver";
-/// Large enough for the panel beside the picture, small enough to be rendered quickly.
+/// The window is large enough for the panel beside the picture, and small enough to be rendered quickly.
 pub const DESKTOP: [u32; 2] = [1024, 640];
 pub const PHONE: [u32; 2] = [390, 844];
-/// A render of a small picture takes well under a second; a machine that also compiles takes its time.
+/// A render of a small picture takes well under a second, but a machine that also compiles takes longer.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 pub const POLL: Duration = Duration::from_millis(50);
-/// Mean difference of two thumbnails, of 255, above which a person sees another picture.
+/// The mean difference of two thumbnails, of 255, above which a person sees another picture.
 pub const ANOTHER_PICTURE: f64 = 1.0;
 /// One step of a drag.
 pub const DRAG_STEP: Duration = Duration::from_millis(20);
 
 static ONE_BROWSER: tokio::sync::Mutex<()> = tokio::sync::Mutex::const_new(());
 
-/// chromedriver on a port of its own. Dropping it ends it and the browsers it has started, also when a test fails.
+/// A chromedriver on a port of its own. Dropping it ends it and the browsers that it has started, also when a test fails.
 pub struct Driver {
     process: Child,
     port: u16,
@@ -55,7 +55,7 @@ impl Driver {
         format!("http://127.0.0.1:{}", self.port)
     }
 
-    /// Killing chromedriver would leave its Chromium behind; asked to shut down, it takes it along.
+    /// Shuts chromedriver down. To kill it would leave its Chromium behind; a shutdown ends both.
     pub fn shut_down(&self) -> std::io::Result<()> {
         let mut stream = TcpStream::connect(("127.0.0.1", self.port))?;
         stream.set_read_timeout(Some(Duration::from_secs(5)))?;
@@ -141,7 +141,7 @@ impl Page {
         self.until("the final frame", "document.querySelector('#picture').dataset.final === 'true'").await;
     }
 
-    /// Does something that changes the picture, and waits for the final frame of the render after it.
+    /// Makes a change of the picture, and waits for the final frame of the render after it.
     pub async fn after(&self, what: &str, change: impl Future<Output = ()>) -> Vec<f64> {
         let frame = self.js("return Number(document.querySelector('#picture').dataset.frame)").await;
         change.await;
@@ -200,7 +200,7 @@ impl Page {
             .expect("a drag");
     }
 
-    /// What the browser has complained of, less the refusals that a test provokes, which it logs as failed loads.
+    /// The complaints of the browser, less the refusals that a test provokes, which it logs as failed loads.
     pub async fn complaints(&self) -> Vec<String> {
         let session = self.client.session_id().await.ok().flatten().expect("a session");
         let url = format!("{}/session/{session}/se/log", self.driver.url());
@@ -219,7 +219,7 @@ impl Page {
         lines.iter().filter(worth_saying).map(|line| line["message"].to_string()).collect()
     }
 
-    /// Ends a test: nothing may have gone wrong unseen.
+    /// Ends a test. Nothing may have gone wrong unseen.
     pub async fn close(self) {
         assert_eq!(self.complaints().await, Vec::<String>::new(), "the browser's console");
         let _ = self.client.clone().close().await;
