@@ -4,6 +4,7 @@ import { json, Problem } from './api.js';
 import { renderAccepted, showProblem } from './alert.js';
 import { OrbitCamera } from './camera.js';
 import { copyCurl } from './curl.js';
+import { showExports } from './exports.js';
 import { fieldSubject } from './field.js';
 import { listenToKeys } from './keys.js';
 import { Picture } from './picture.js';
@@ -211,6 +212,7 @@ async function start() {
   const { techniques: list } = await json('v1/techniques');
   techniques.load(list);
   await volumes.load(list);
+  showExports(byId('exports'), list, () => volumes.reference());
   volumeChosen();
   showDevice().catch(() => { /* a line of decoration */ });
 }

@@ -1,4 +1,10 @@
 //! The techniques: the trait of each kind and the one list. A technique is three files of one name and one line here.
+//!
+//! A technique drives the device through a handle, [`crate::device::Device`], and hands over no recording of what is to be done. Both were
+//! tried on `histogram`, with the same table and the same time (256³ voxels, AVX-512: 455 and 458 ms). The recording took 24 lines more in the
+//! technique and 67 for its player. It cannot decide: each decision (does a slice's time ask for fewer items, is there more to do, has the
+//! solver converged) ends one recording, and the step falls into a part that records and one that learns. A wrong name is found only when
+//! it is played. With the handle both stand in one function, in the order in which they happen.
 
 mod case;
 pub mod emission_absorption;

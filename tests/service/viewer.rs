@@ -100,6 +100,15 @@ async fn the_transfer_function_changes_the_picture() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_volume_is_exported_to_a_file() {
+    let page = Page::open(DESKTOP).await;
+    page.settled().await;
+    page.js("document.querySelector('#exports button').click()").await;
+    page.until("the exported file", "document.querySelector('#exports button').dataset.state === 'done'").await;
+    page.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn volumes_are_uploaded_and_deleted() {
     let page = Page::open(DESKTOP).await;
     page.settled().await;
