@@ -1,6 +1,6 @@
 // Macro-cells: the least and greatest voxel that a sample in each block of CELL^3 voxels can read. Trilinear interpolation in
 // the samples [CELL c, CELL c + CELL) reads the voxels CELL c - 1 .. CELL c + CELL. One work-item is one row of cells in x.
-// A cell of NaN only has its least above its greatest.
+// In a cell of NaN only, the least is above the greatest.
 
 #include "shared/voxel.h"
 

@@ -1,6 +1,6 @@
-// For each macro-cell the Chebyshev distance in cells to the nearest occupied one, 0 where occupied, 255 for 255 or more: one
-// axis a pass (x, y, z), since the greatest of three differences can be taken one after the other. A cell is occupied where
-// its range meets one of the intervals. One work-item is one line of cells along the pass's axis.
+// The Chebyshev distance in cells from each macro-cell to the nearest occupied one, 0 if occupied, 255 for 255 or more. Each pass works along one
+// axis (x, y, z), since the greatest of three differences can be taken one after the other. A cell is occupied if its range meets one of the
+// intervals. One work-item is one line of cells along the pass's axis.
 
 #include "shared/voxel.h"
 

@@ -57,8 +57,8 @@ static inline void styled_step(constant const View *view, constant const Emissio
 #endif
 
 #if IN_STRIDES
-// Shades the steps from k to end - 1, whose positions in the table are known. A lit sample takes long from its gradient to its colour: the
-// gradients have a loop of their own, so that the processor works on the light of several steps at once.
+// Shades the steps from k to end - 1, whose positions in the table are known. A lit sample takes long from its gradient to its colour: the gradients
+// have a loop of their own, so that the processor works on the light of several steps at once.
 static inline void shade_steps(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels, global const uchar *table,
                        const Packet *p, int k, int end, Span span, int form, const Real *position, Radiance *r) {
 #if SHADED
@@ -94,8 +94,8 @@ static inline void shade_steps(constant const View *view, constant const Emissio
 #endif
 }
 
-// The steps from k to end - 1, at most STRIDE, all of them whole: first the values, then their shading. In two short loops the
-// processor works on several steps at once; in a long one on about one.
+// Takes the steps from k to end - 1, at most STRIDE, all of them whole: first the values, then their shading. In two short loops the processor works
+// on several steps at once; in a long one it works on about one.
 static inline void whole_steps(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
                                global const uchar *table, const Packet *p, int k, int end, Radiance *r) {
     Real position[STRIDE], low = (Real)(INFINITY), high = (Real)(-INFINITY);
@@ -113,7 +113,7 @@ static inline void whole_steps(constant const View *view, constant const Emissio
 }
 #endif
 
-// A whole step of every lane, away from the box's faces.
+// Takes a whole step of every lane, away from the box's faces.
 static inline void inner_step(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
                               global const uchar *table, const Packet *p, Real k, Radiance *r) {
     Real3 at = along(p->start, p->pace, k);
@@ -128,7 +128,7 @@ static inline void inner_step(constant const View *view, constant const Emission
     composite(params, o, r);
 }
 
-// Any step: only what of it is inside the lane's ray counts, and absorbs for that long.
+// Takes any step. Only its part inside the lane's ray counts, and absorbs over that length.
 static inline void edge_step(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
                              global const uchar *table, const Packet *p, int k, Radiance *r) {
     Real t, length;
@@ -145,7 +145,7 @@ static inline void edge_step(constant const View *view, constant const EmissionA
     composite(params, o, r);
 }
 
-// The steps from k to end - 1 of a packet; its radiance stays in registers meanwhile.
+// Takes the steps from k to end - 1 of a packet. Its radiance stays in registers meanwhile.
 static inline void march(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels,
                          global const uchar *table, const Packet *p, int k, int end, Radiance *radiance) {
     Radiance r = *radiance;
@@ -174,7 +174,7 @@ static inline void march(constant const View *view, constant const EmissionAbsor
     *radiance = r;
 }
 
-// What a beam leaves to the next launch; its step and the packets that go on are in the header.
+// The state that a beam leaves to the next launch. Its step and the packets that go on are in the header.
 typedef struct { Radiance r[PACKETS]; } BeamState;
 STATE_IS(BeamState, RADIANCE_STATE_WORDS);
 

@@ -1,16 +1,16 @@
-// Encodes the film where it is: as the picture in sRGB bytes, and as sums that its error is made of. The film stays on the device.
+// Encodes the film on the device: as the picture in sRGB bytes, and as the sums for its error. The film stays on the device.
 //
-// Items, in order: blocks of two rows of the film; rows of the control; where the film has fewer pixels than the picture (WHOLE 0), rows
-// of the picture, which is interpolated. Each of the first two leaves SUM_LENGTH numbers of its own, which the host adds up in double precision.
-// Squares are added up as parts of the greatest square so far, so that none is lost below the least float.
+// Items, in order: blocks of two rows of the film; rows of the control; if the film has fewer pixels than the picture (WHOLE 0), rows of the picture,
+// which is interpolated. Each of the first two leaves SUM_LENGTH numbers of its own, which the host sums in double precision. Squares are summed
+// relative to the greatest square so far, so that none falls below the least float.
 
 #include "shared/lanes.h"
 #include "shared/pixels.h"
 
-// Pixels of a row that a work-item takes; a whole number of packets and of tiles.
+// Pixels of a row per work-item: a whole number of packets and of tiles.
 #define ACROSS (LANES == 1 ? 32 : 8 * LANES)
 
-// Makes `scale` the greatest yet. Returns the factor of the squares so far, which are parts of the square of the scale before.
+// Raises `scale` to the greatest value so far. Returns the factor of the squares so far, which are relative to the square of the old scale.
 static inline float rescale(float *scale, Real values) {
     if (!any_lane(MASK(values > *scale))) return 1.0f;
     float before = *scale;
@@ -33,7 +33,7 @@ static inline float sum_lanes(Real v) {
 #endif
 }
 
-// The mean squared deviation from their mean of four pixels; of two rows of a packet the sum of those of whole blocks of 2 × 2.
+// The mean squared deviation of four pixels from their mean. For two rows of a packet it is the sum over the whole blocks of 2 × 2.
 #if LANES == 1
 #define FOUR Real
 #else
@@ -52,8 +52,8 @@ static inline float of_blocks(Real upper, Real lower, int inside) {
 }
 #endif
 
-// The sum over every second pixel of a row of a block of the squared difference to the mean of its neighbours: the loss of a picture that is
-// interpolated between every second one. `row` has the pixels of a packet; the last of one lane is kept in `last`, the one before first.
+// The sum over every second pixel of a block's row of the squared difference to the mean of its neighbours: the loss of a picture that is
+// interpolated between every second one. `row` has the pixels of a packet. With one lane, `last` keeps the last two pixels, the earlier one first.
 static inline float of_between(Real row, float scale, int x, int inside, float *last, float *pixels) {
     float sum = 0.0f;
 #if LANES == 1
@@ -73,7 +73,7 @@ static inline float of_between(Real row, float scale, int x, int inside, float *
     return sum;
 }
 
-// The variance of single samples of some pixels; 0 where it is not known.
+// The variance of single samples of some pixels; 0 if it is not known.
 static inline Real variances(Real m2, Real count) {
     return select((Real)(0.0f), m2 / (count - 1.0f), MASK(count > 1.0f) & known(m2));
 }
@@ -101,7 +101,7 @@ static inline void of_film(constant Encode *d, global const float *film, global 
             int pixel = (y0 + row) * d->width + x;
             Real alpha;
             Real3 colour = load_pixels(film, pixel, &alpha);
-            // Beside the volume there is nothing to add up but unknown errors.
+            // Beside the volume only unknown errors are summed.
             Int lit = as_Int(colour.x) | as_Int(colour.y) | as_Int(colour.z) | as_Int(alpha);
             int is_empty = !any_lane(MASK(lit != 0) & lanes);
 #if WHOLE
@@ -151,7 +151,7 @@ static inline void of_film(constant Encode *d, global const float *film, global 
     sums[SUM_WEIGHTED] = sum_lanes(weighted);
 }
 
-// A row of the control against the film's pixels at the same positions.
+// Compares a row of the control with the film's pixels at the same positions.
 static inline void of_control(constant Encode *d, global const float *film, global const float *control, global const uint *counts,
                               int y, global float *sums) {
     global const float *deviations = film + 4 * d->width * d->height;
@@ -184,7 +184,7 @@ static inline void of_control(constant Encode *d, global const float *film, glob
 }
 
 #if !WHOLE
-// The position of a pixel of the picture among the film's `n`: between the one that is returned and *high, *part of the way.
+// The position of a picture's pixel among the film's `n`: between the returned pixel and *high, at *part of the distance.
 static inline Int film_position(Int full, int stride, int n, Int *high, Real *part) {
     Real at = to_real(full) / (float)stride;
     at = at < (float)(n - 1) ? at : (Real)((float)(n - 1));
@@ -200,7 +200,7 @@ static inline Real between(Real a, Real b, Real part) {
     return a + more;
 }
 
-// A row of the picture from a film of fewer pixels. Returns the number of clipped values.
+// Makes a row of the picture from a film of fewer pixels. Returns the number of clipped values.
 static inline int enlarge(constant Encode *d, global const float *film, global const uchar *curve, global uchar *picture, int y) {
     int clipped = 0;
     Int y1;

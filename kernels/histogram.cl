@@ -1,5 +1,5 @@
-// How many voxels have which value. One work-item counts a run of voxels; counts are whole numbers, so their order does not matter.
-// Behind the counts of the bins are those of voxels below the range, above it, and without a value.
+// The number of voxels per value. One work-item counts a run of voxels. Counts are whole numbers, so that their order does not matter. Behind the
+// counts of the bins are those of voxels below the range, above it, and without a value.
 
 #include "shared/image.h"
 #include "shared/voxel.h"

@@ -15,7 +15,7 @@
 
 typedef struct {
     Real ahead;          // the value at the end of the last step
-    int fresh;           // true if that is not known, since a leap came after it
+    int fresh;           // true if `ahead` is not known, after a leap
 #if LAYERED
     Real3 colour;
     Real transmittance;
@@ -40,7 +40,7 @@ static inline Search search_start(void) {
     return s;
 }
 
-typedef struct { Real t, length, before, after; Mask inside; } Stretch; // a step: where it starts, and the values at its ends
+typedef struct { Real t, length, before, after; Mask inside; } Stretch; // a step: its start, and the values at its ends
 
 static inline Stretch stretch_of(constant const View *view, VOLUME voxels, const Packet *p, int k, const Search *s) {
     Stretch e;
@@ -83,7 +83,7 @@ static inline Real3 surface_colour(constant const View *view, constant const Iso
 }
 
 #if LAYERED
-// Both ways through the surfaces: ascending where the value rises, descending where it falls.
+// Crosses the surfaces in both directions: ascending if the value rises, descending if it falls.
 static inline void cross(constant const View *view, constant const Isosurface *params, VOLUME voxels, const Packet *p, const Stretch *e,
                          Search *s) {
     Mask rises = MASK(e->after > e->before);
@@ -113,7 +113,7 @@ static inline void cross(constant const View *view, constant const Isosurface *p
 }
 #endif
 
-// The steps from k to end - 1 of a packet.
+// Takes the steps from k to end - 1 of a packet.
 static inline void seek(constant const View *view, constant const Isosurface *params, VOLUME voxels, const Packet *p, int k, int end,
                         Search *search) {
     Search s = *search;
@@ -155,7 +155,7 @@ static inline void show(constant const View *view, constant const Isosurface *pa
     film_packet(view, film, counts, p->column, p->row, colour, alpha);
 }
 
-// What a beam leaves to the next launch; its step, the packets that go on, and those whose last value is not known are in the header.
+// The state that a beam leaves to the next launch. Its step, the packets that go on, and those whose last value is not known are in the header.
 #if LAYERED
 typedef struct { Real ahead; Real3 colour; Real transmittance; } PacketState;
 #else

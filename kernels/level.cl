@@ -1,4 +1,4 @@
-// The instruction set that this is compiled for, as a number of src/device/level.rs.
+// The instruction set for which this is compiled, as a number of src/device/level.rs.
 #if defined(__AVX512F__) && defined(__AVX512BW__) && defined(__AVX512DQ__) && defined(__AVX512VL__)
 #define LEVEL LEVEL_AVX512
 #elif defined(__AVX2__)

@@ -1,8 +1,7 @@
-// Photons through participating media: free paths by optical depth, -ln(u) = integral of sigma ds; absorption by weight; scattering
-// by the medium's phase function; refraction and reflection where the index changes; Russian roulette for weights that no longer
-// matter (it keeps the mean, an energy cut-off does not).
-// One work-item carries a packet of photons; a lane whose photon has ended takes the next of the item's. On a CPU one item of each
-// work-group works and has a grid of its own, for atomics take a third of the time.
+// Photons through participating media: free paths by optical depth, -ln(u) = integral of sigma ds; absorption by weight; scattering by the medium's
+// phase function; refraction and reflection where the index changes; Russian roulette for small weights (it keeps the mean, an energy cut-off does
+// not). One work-item carries a packet of photons; a lane whose photon has ended takes the next of the item's. On a CPU one item of each work-group
+// works and has a grid of its own, since atomics take a third of the time.
 
 #include "shared/compton.h"
 #include "shared/dda.h"
@@ -17,7 +16,7 @@
 #include "shared/rng.h"
 #include "shared/tally.h"
 
-// A step of all lanes: its end, and the medium where it began.
+// A step of all lanes: its end, and the medium at its start.
 typedef struct {
     Mask hit, crosses, late; // at a collision, at a cell boundary, at the time gate
     Int medium;
@@ -54,7 +53,7 @@ static inline Int medium_here(constant const PhotonTransport *params, global con
 #if HAS_CLEARANCE
     return photon->medium;
 #else
-    // Within blocks the medium counts at collisions alone, where no boundary bends light.
+    // Within blocks the medium matters only at collisions, unless a boundary bends light.
     if (!BLOCK_CELLS || GAMMA || params->mismatch) return medium_of(params, table, photon->cell, photon->p);
     return (Int)(0);
 #endif
@@ -73,7 +72,7 @@ static inline Real rate_here(constant const PhotonTransport *params, global cons
 #endif
 }
 
-// Ends steps of length *t at the time gate. Returns the photons that come to it.
+// Ends steps of length *t at the time gate. Returns the photons that reach it.
 static inline Mask gate(constant const PhotonTransport *params, global const float *table, Int medium, Mask alive, Photon *photon, Real *t) {
     Real index = index_of(params, table, medium);
     Mask late = alive & MASK(mad(index, *t, photon->optical) > params->gate_mm);
@@ -104,7 +103,7 @@ static inline Step advance(constant const FieldPass *pass, constant const Photon
     s.ahead = boundaries_ahead(params, table, photon);
     Real t_boundary = s.ahead.nearest;
 #if TRACKING == TRACKING_MARCH
-    // The lecture's march: a free path is as many whole steps as it takes to use up its optical depth.
+    // The lecture's march: a free path takes whole steps until they use up its optical depth.
     Real t = fmin(t_boundary, (Real)(params->march_step_mm));
     Mask at_boundary = MASK(t_boundary <= params->march_step_mm);
     s.hit = alive & ~at_boundary & MASK(photon->depth <= s.rate * t) & MASK(s.rate > 0.0f);
@@ -144,7 +143,7 @@ static inline void score_collision(constant const PhotonTransport *params, globa
     deposit(params, grid, voxel, photon->p, amount, real);
 }
 
-// The weights that are left after the roulette, which faint ones play.
+// The weights that are left after the roulette, which small weights play.
 static inline Real roulette(constant const FieldPass *pass, constant const PhotonTransport *params, Real left, Mask real,
                             const Photon *photon, Gains *gains) {
     Mask faint = MASK(fabs(left) < params->roulette_threshold) & real;
@@ -156,7 +155,7 @@ static inline Real roulette(constant const FieldPass *pass, constant const Photo
 }
 
 #if BLOCK_CELLS
-// The real ones of the tentative collisions `hit`; *sigma is the extinction there.
+// The real collisions among the tentative ones `hit`; *sigma is the extinction there.
 static inline Mask real_of(constant const PhotonTransport *params, global const float *table, global ulong *ledger, const Step *s, Int medium,
                            Mask hit, Photon *photon, Real *sigma) {
     *sigma = extinction_at(params, table, medium, photon->cell, photon->p);
@@ -174,7 +173,7 @@ static inline Mask scatter(constant const FieldPass *pass, constant const Photon
                            const Step *s, Photon *photon, Grid *grid, Gains *gains) {
     Mask hit = s->hit, real = hit;
 #if TRACKING == TRACKING_MARCH || BLOCK_CELLS
-    // The medium is that of the point which the photon has come to.
+    // The medium is that of the photon's new position.
     Int medium = medium_of(params, table, photon->cell, photon->p);
 #else
     Int medium = s->medium;
@@ -184,7 +183,7 @@ static inline Mask scatter(constant const FieldPass *pass, constant const Photon
     Real sigma = s->rate, one_minus, one_plus;
 #if GAMMA
     m.albedo = attenuation_at(params, table, medium, photon->energy).albedo;
-    // Weight is energy: the part that the electron gets is absorbed as well. Below the tables all of it is.
+    // Weight is energy: the electron's part is absorbed as well. Below the tables all of it is absorbed.
     Real kept = compton(pass, photon, photon->energy, hit, &one_minus);
     m.albedo *= select((Real)(0.0f), kept, MASK(kept * photon->energy > params->gamma_least_kev));
 #endif
@@ -216,7 +215,7 @@ static inline Mask scatter(constant const FieldPass *pass, constant const Photon
     return goes_on | (hit & ~real);
 }
 
-// Photons that came to a cell boundary or the time gate. Returns those that are gone.
+// Handles photons at a cell boundary or the time gate. Returns those that are gone.
 static inline Mask arrive(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table, global ulong *ledger,
                           const Step *s, Photon *photon, Gains *gains) {
     Mask gone = s->late;
@@ -235,8 +234,8 @@ static inline Mask faults_of(constant const PhotonTransport *params, global ulon
     return fault;
 }
 
-// The state of the packet is variables of their own, not one struct: with sums in it, which are indexed in memory, it was 4 % slower.
-// What a work-item leaves to the next launch; its queue is in the header.
+// The state that a work-item leaves to the next launch; its queue is in the header. In the kernel the packet's state is separate variables, not one
+// struct: with the sums in it, which are indexed in memory, it was 4 % slower.
 typedef struct { Photon photon; Int steps; Mask alive; } PhotonState;
 STATE_IS(PhotonState, PHOTON_STATE_WORDS);
 

@@ -1,6 +1,6 @@
-// Projections along a ray: greatest and least value, mean, sum (the line integral in world units) and X-ray (Beer and Lambert).
-// WALKED is the exact walk of shared/walk.h; without it greatest and least are taken on the steps of shared/packet.h, the
-// part of a beam with the greatest bound first, until no part is left that could show more. One work-item is one beam.
+// Projections along a ray: greatest and least value, mean, sum (the line integral in world units) and X-ray (Beer and Lambert). WALKED is the exact
+// walk of shared/walk.h. Without it the greatest and least value are taken on the steps of shared/packet.h, the part of a beam with the greatest
+// bound first, until no part is left that could exceed them. One work-item is one beam.
 
 #include "shared/film.h"
 #include "shared/inner.h"
@@ -33,21 +33,21 @@ static inline void project(constant const View *view, constant const Projection 
     } else {
         // sigma = sigma_per_value (value - zero_value), so its integral needs no walk of its own.
         value = exp(-params->sigma_per_value * (integral - params->zero_value * w.length));
-        shown = (Mask)(-1); // past the volume all the light gets through
+        shown = (Mask)(-1); // past the volume the transmittance is 1
     }
     show(view, params, table, film, counts, p, value, shown);
 }
 #else
-// Steps of a part of a beam, and parts whose bounds are kept at a time. Shorter parts have tighter bounds and cost more of them:
-// on a 256^3 picture 4 steps take a sixth longer.
+// The steps of a part of a beam, and the number of parts whose bounds are kept at a time. Shorter parts have tighter bounds and cost more of them: on
+// a 256^3 picture 4 steps take a sixth longer.
 #define PART 8
 #define PARTS 64
 
-// No sample of the beam in the steps first..last has a greater sign * raw value.
+// The bound of a beam's part: no sample in the steps first..last has a greater sign * raw value.
 static inline float part_bound(constant const View *view, constant const Projection *params, global const uchar *ranges, const Beam *b, int first,
                                int last) {
 #if INTERPOLATION == INTERPOLATION_CATMULL_ROM
-    return INFINITY; // overshoots what the cells say
+    return INFINITY; // overshoots the cells' ranges
 #else
     // A B-spline reads a voxel further than the cells do.
     const float wider = TAPS == 4 ? 1.0f : 0.0f;
@@ -72,7 +72,7 @@ static inline float part_bound(constant const View *view, constant const Project
 #endif
 }
 
-// The steps first..last-1 of one packet, in the lanes that take a sample there.
+// Takes the steps first..last-1 of one packet, in the lanes that have a sample there.
 static inline void take_steps(constant const View *view, constant const Projection *params, VOLUME voxels, const Packet *p, int first,
                               int last, Real *best) {
     for (int k = first; k < last;) {
@@ -94,8 +94,8 @@ static inline void take_steps(constant const View *view, constant const Projecti
     }
 }
 
-// Takes the samples of the parts of a beam from step `begin` on, the part with the greatest bound first, until no part is left that could
-// show more. `least` is what a part has to exceed to be of use to a packet.
+// Takes the samples of the parts of a beam from step `begin` on, the part with the greatest bound first, until no part is left that could exceed the
+// best values. A part is of no use to a packet unless its bound exceeds `least`.
 static inline void take_parts(constant const View *view, constant const Projection *params, VOLUME voxels, global const uchar *ranges,
                               const Beam *beam, const Packet *packets, int begin, float *least, Real *best) {
     float bound[PARTS];
@@ -122,7 +122,7 @@ static inline void take_parts(constant const View *view, constant const Projecti
 }
 #endif
 
-// What a beam leaves to the next launch, if it is not walked; its step is in the header.
+// The state that a beam leaves to the next launch, if it is not walked. Its step is in the header.
 typedef struct { Real best[PACKETS]; } BeamState;
 STATE_IS(BeamState, PROJECTION_BEAM_STATE_WORDS);
 

@@ -1,19 +1,19 @@
-// Sums and extremes of floats. A work-item reduces a block of BLOCK values in their order, and the host adds the blocks up in theirs, so the
-// result is the same for any number of threads and lanes.
+// Sums and extremes of floats. A work-item reduces a block of BLOCK values in their order, and the host sums the blocks in theirs, so that the result
+// is the same for any number of threads and lanes.
 //
-// Sums are compensated (Neumaier, ZAMM 54, 1974): what an addition rounds away is kept apart, and the error of a product is known exactly by
-// fma. Nothing may be contracted, or that would not hold.
+// Sums are compensated (Neumaier, ZAMM 54, 1974): the part that an addition rounds away is kept apart, and fma gives the exact error of a product.
+// Contraction would break this, so it is off.
 
 #pragma OPENCL FP_CONTRACT OFF
 
-// A sum, and what its additions have rounded away.
+// A sum, and the part that its additions have rounded away.
 static inline float2 added(float2 sum, float value) {
     float next = sum.x + value;
     float lost = fabs(sum.x) >= fabs(value) ? (sum.x - next) + value : (value - next) + sum.x;
     return (float2)(next, sum.y + lost);
 }
 
-// The values of a work-item's block: none past the end.
+// The values of a work-item's block; none past the end.
 static inline int2 block_of(constant int *count) {
     int first = (int)get_global_id(0) * BLOCK;
     return (int2)(first, min(first + BLOCK, *count));
@@ -39,7 +39,7 @@ kernel void dot_product(constant int *count, global const float *a, global const
     partials[get_global_id(0)] = sum;
 }
 
-// The least and the greatest value that is a finite number; the first is above the second where there is none.
+// The least and the greatest finite value; the first is above the second if there is none.
 kernel void extremes(constant int *count, global const float *a, global float2 *partials) {
     int2 block = block_of(count);
     if (block.x >= block.y) return;

@@ -1,9 +1,9 @@
-// Light that is scattered once on its way to the eye, and what comes straight. From the eye a free flight finds a collision; from there
-// a ratio flight goes to every light, and a free flight in a direction of the phase function to the sky. Points, spheres and quads are
-// also sampled equiangularly: from points on the ray that are chosen by the angle under which they see the light (Kulla & Fajardo, "Importance Sampling Techniques for
-// Path Tracing in Participating Media", EGSR 2012): t - t_light = D tan(theta), density D / ((theta_b - theta_a) (D^2 + (t - t_light)^2)).
-// The free flight's density is known only on average, e = sigma exp(-sigma t); any weights that sum to 1 leave the mean as it is.
-// One work-item is a tile of ITEM x ITEM pixels; a lane that is through with its sample takes the next of them.
+// Light that reaches the eye directly or after one scattering. From the eye a free flight finds a collision; from there a ratio flight goes to every
+// light, and a free flight in a direction of the phase function to the sky. Points, spheres and quads are also sampled equiangularly: from points on
+// the ray that are chosen by the angle under which they see the light (Kulla & Fajardo, "Importance Sampling Techniques for Path Tracing in
+// Participating Media", EGSR 2012): t - t_light = D tan(theta), density D / ((theta_b - theta_a) (D^2 + (t - t_light)^2)). The free flight's density
+// is known only on average, e = sigma exp(-sigma t); any weights that sum to 1 keep the mean. One work-item is a tile of ITEM x ITEM pixels; a lane
+// that has finished its sample takes the next one.
 
 #include "shared/camera_flight.h"
 #include "shared/flight.h"
@@ -16,19 +16,19 @@
 #include "shared/tile.h"
 #include "shared/tracker.h"
 
-// The task of a lane: 0 the way from the eye; 1 .. lights a light seen from the collision; then the sky; then for each light the way from
-// the eye to an equiangular vertex, and from there to the light.
+// The task of a lane: 0 the way from the eye; 1 .. lights a light seen from the collision; then the sky; then for each light the way from the eye to
+// an equiangular vertex, and from there to the light.
 typedef struct {
     Flight flight;
     Int at, task;
     Real3 light;
     Real alpha;
-    Real3 entry, entry_world, d; // where the ray from the eye enters the volume
-    Real length, t_from;         // how far it goes through it; where it begins
-    Mask met;                    // true if it met a collision,
-    Real3 vertex, vertex_world;   // and where
+    Real3 entry, entry_world, d; // the point at which the ray from the eye enters the volume
+    Real length, t_from;         // its length in the volume, and its start
+    Mask met;                    // true if it met a collision
+    Real3 vertex, vertex_world;   // the point of the collision
     Real3 scattered;             // the light that leaves it
-    Real density;                // of the phase function's direction
+    Real density;                // the density of the phase function's direction
 } Sample;
 
 static inline void begin(constant const View *view, constant const Scattering *params, Int column, Int row, Mask fresh, Sample *s) {
@@ -47,7 +47,7 @@ static inline void begin(constant const View *view, constant const Scattering *p
     aim(view, params, fresh, f);
 }
 
-// The density of the length t by the angle under which the light is seen; and, where it is to `choose` one, a length by that angle from the
+// The density of the length t by the angle under which the light is seen. In the lanes of `choose`, first sets t to a length by that angle from the
 // number u.
 static inline Real by_angle(const Sample *s, const Light *l, Real u, Mask choose, Real *t) {
     Real3 middle = select3(l->position, along(along(l->position, l->u, (Real)(0.5f)), l->v, (Real)(0.5f)), MASK(l->kind == LIGHT_QUAD));
@@ -55,7 +55,7 @@ static inline Real by_angle(const Sample *s, const Light *l, Real u, Mask choose
     Real t_light = dot3(to, s->d);
     Real3 off = minus3(to, scale3(s->d, t_light));
     Real far = fmax(sqrt(dot3(off, off)), fmax(1e-6f * s->length, (Real)(1e-20f)));
-    // theta_b - theta_a and the tangent of a sum of angles, so that nothing cancels however far away the light is.
+    // The angle theta_b - theta_a and the tangent of a sum of angles are written so that nothing cancels, however far away the light is.
     Real squared = mad(far, far, t_light * t_light);
     Real angle = fmax(atan2(s->length * far, mad(far, far, -t_light * (s->length - t_light))), (Real)(1e-30f)), part = u * angle;
     Real sine = sin(part), chosen = sine * squared / mad(far, cos(part), t_light * sine);
@@ -76,7 +76,7 @@ static inline Real3 lit(constant const Scattering *params, global const float *t
     return scale3(ray->light, density * share);
 }
 
-// Flights to light `which` from the collision.
+// Begins flights to light `which` from the collision.
 static inline Mask from_collision(constant const View *view, constant const Scattering *params, global const float *table, Mask on, Int which, Sample *s) {
     Flight *f = &s->flight;
     UInt4Lanes r = draw(view, f, 1);
@@ -93,7 +93,7 @@ static inline Mask from_collision(constant const View *view, constant const Scat
     return on;
 }
 
-// Flights from the collision in a direction of the phase function.
+// Begins flights from the collision in a direction of the phase function.
 static inline Mask to_sky(constant const View *view, constant const Scattering *params, global const float *table, Mask on, Sample *s) {
     Flight *f = &s->flight;
     UInt4Lanes r = draw(view, f, 1);
@@ -105,7 +105,7 @@ static inline Mask to_sky(constant const View *view, constant const Scattering *
     return on;
 }
 
-// Flights from the eye to an equiangular vertex of light `which`; their throughput is the scattered part there at a density of 1.
+// Begins flights from the eye to an equiangular vertex of light `which`; their throughput is the scattered part there at a density of 1.
 static inline Mask to_equiangular(constant const View *view, constant const Scattering *params, global const float *table, Mask on, Int which, Sample *s) {
     Flight *f = &s->flight;
     UInt4Lanes r = draw(view, f, 1);
@@ -118,7 +118,7 @@ static inline Mask to_equiangular(constant const View *view, constant const Scat
     return on;
 }
 
-// Flights from the equiangular vertex to the light.
+// Begins flights from the equiangular vertex to the light.
 static inline Mask from_equiangular(constant const View *view, constant const Scattering *params, VOLUME voxels, global const float *table, Mask on, Int which,
                               Sample *s) {
     Flight *f = &s->flight;
@@ -132,7 +132,7 @@ static inline Mask from_equiangular(constant const View *view, constant const Sc
     return on;
 }
 
-// Gives the lanes of `idle` their next flight. Returns the samples that are through.
+// Gives the lanes of `idle` their next flight. Returns the samples that are complete.
 static inline Mask advance(constant const View *view, constant const Scattering *params, VOLUME voxels, global const float *table, Mask idle, Sample *s) {
     int lights = params->lights, last = params->equiangular ? 3 * lights + 1 : lights + 1;
     Mask through = (Mask)(0), begun = (Mask)(0);
@@ -151,7 +151,7 @@ static inline Mask advance(constant const View *view, constant const Scattering 
         if (any_lane(flies)) {
             Mask out = to_equiangular(view, params, table, flies, which, s);
             starts |= out;
-            // There is no vertex to go on from.
+            // Without a vertex the flight from it is skipped.
             s->task += select((Int)(0), (Int)(1), flies & ~out);
         }
         begun |= starts;
@@ -161,7 +161,7 @@ static inline Mask advance(constant const View *view, constant const Scattering 
     return through;
 }
 
-// Free flights that met a collision: the first scatters, the one after it only shines.
+// Handles free flights that met a collision: the first one scatters, the one after it only adds emission.
 static inline void collide(constant const Scattering *params, global const float *table, Mask real, Sample *s) {
     Flight *f = &s->flight;
     Mask first = real & MASK(s->task == 0);
@@ -179,7 +179,7 @@ static inline void collide(constant const Scattering *params, global const float
     s->met |= first & MASK(magnitude(leaves) > 0.0f);
 }
 
-// Flights that came to their end: at a light, at a vertex, or out of the volume.
+// Handles flights that reached their end: at a light, at a vertex, or out of the volume.
 static inline void arrive(constant const Scattering *params, global const float *table, Mask over, Sample *s) {
     Flight *f = &s->flight;
     Real3 arrives = scale3(f->throughput, f->weight);
@@ -196,7 +196,7 @@ static inline void arrive(constant const Scattering *params, global const float 
     if (!(params->sky && params->sky_visible)) s->alpha = select(s->alpha, 1.0f - (arrives.x + arrives.y + arrives.z) * (1.0f / 3.0f), first);
 }
 
-// What a tile leaves to the next launch; the pixels that it has taken are in the header.
+// The state that a tile leaves to the next launch. The pixels that it has taken are in the header.
 typedef struct { Sample s; Mask alive; } TileState;
 STATE_IS(TileState, SCATTERING_STATE_WORDS);
 

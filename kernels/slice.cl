@@ -15,7 +15,7 @@ static inline void cut(constant const View *view, constant const Slice *params, 
     Ray ray = p->ray;
     Real distance = mad(a[0], ray.origin.x, mad(a[1], ray.origin.y, mad(a[2], ray.origin.z, (Real)(a[3]))));
     Real speed = mad(a[0], ray.direction.x, mad(a[1], ray.direction.y, a[2] * ray.direction.z));
-    // The plane's normal and the ray are of unit length in the world: below this they are parallel.
+    // The plane's normal and the ray are of unit length in the world. Below this product they are parallel.
     Mask shown = MASK(fabs(speed) > 1e-6f);
     Real t = -distance / select((Real)(1.0f), speed, shown);
     shown &= MASK(t >= ray.t_near) & MASK(t <= ray.t_far);

@@ -1,7 +1,7 @@
-// The radiative transfer equation by paths from the eye: L = sum over scatterings of throughput * (albedo phase) * light, unbiased. At
-// each scattering one light is chosen and aimed at (next-event estimation, its transmittance by a ratio flight), then the path goes on in
-// a direction of the phase function; the sky and lights of some size that it meets there are weighed by the balance
-// heuristic. One work-item is a tile of ITEM x ITEM pixels; a lane whose path has ended takes the next of them.
+// The radiative transfer equation by paths from the eye: L = sum over scatterings of throughput * (albedo phase) * light, unbiased. At each
+// scattering one light is chosen and aimed at (next-event estimation, its transmittance by a ratio flight), then the path goes on in a direction of
+// the phase function. The balance heuristic weighs the sky and the lights of non-zero size that it meets there. One work-item is a tile of ITEM x
+// ITEM pixels; a lane whose path has ended takes the next of them.
 
 #include "shared/camera_flight.h"
 #include "shared/flight.h"
@@ -18,12 +18,12 @@
 typedef struct {
     Flight flight;
     Int at;                    // the pixel in the film
-    Real3 light;               // that has come to the eye
+    Real3 light;               // the light that has reached the eye
     Real alpha;
     Int scatterings;
-    Real density;              // of the direction in which the path flies, per steradian; 0 on the way from the eye
-    Real t_from;               // where on its way the path's flight begins: before 0 at the eye
-    Real3 from, from_world;    // the last scattering, where the path goes on when a light has been aimed at
+    Real density;              // the density of the path's direction, per steradian; 0 on the way from the eye
+    Real t_from;               // the start of the path's flight along its way: before 0 at the eye
+    Real3 from, from_world;    // the last scattering, from which the path goes on after aiming at a light
     Real3 next, throughput;
     Real next_depth;
 } Path;
@@ -50,24 +50,24 @@ static inline void begin(constant const View *view, constant const Scattering *p
     aim(view, params, fresh, f);
 }
 
-// Flights that come to a face from inside. Returns those that are reflected.
+// Handles flights that reach a face from inside. Returns those that are reflected.
 static inline Mask surface_out(constant const View *view, constant const Scattering *params, Mask out, Int face, Path *path) {
     Flight *f = &path->flight;
     Mask back = cross_face(view, params->index, face, unit_open(draw(view, f, 4).a), out, &f->d);
-    // In clear glass a path that is totally reflected would go on for ever: a face counts as much as a hundred collisions.
+    // In clear glass a totally reflected path would go on for ever. So a face counts as a hundred collisions.
     f->event += as_UInt(select((Int)(0), (Int)(100), out));
     f->throughput = select3(f->throughput, scale3(f->throughput, (Real)(params->index * params->index)), out & ~back);
     return back;
 }
 
-// Adds the light of lights that the flight of a path has met, up to the length `to`.
+// Adds the light of the lights that a path's flight has met, up to the length `to`.
 static inline void meet(constant const Scattering *params, global const float *table, Path *path, Real to, Mask on) {
     if (!params->discs) return;
     Real3 light = met(params, table, path->from_world, path->flight.d, path->t_from, to, path->density, params->next_event ? MASK(path->density > 0.0f) : (Mask)(0), 0);
     add_light(&path->light, scale3(times3(light, path->flight.throughput), path->flight.weight), on);
 }
 
-// Paths that scatter: light emitted there, a light aimed at, a direction to go on in. Returns those that have ended.
+// Scatters paths: light emitted there, a light aimed at, a direction to go on in. Returns those that have ended.
 static inline Mask scatter(constant const View *view, constant const Scattering *params, global const float *table, UInt4Lanes r, Mask real,
                            Path *path, Mask *elsewhere) {
     Flight *f = &path->flight;
@@ -86,7 +86,7 @@ static inline Mask scatter(constant const View *view, constant const Scattering 
         Real chance = magnitude(leaves) / params->roulette_threshold;
         Mask stays = MASK(u < chance);
         leaves = select3(leaves, scale3(leaves, 1.0f / chance), faint);
-        u = select(u, fmin(u / chance, (Real)(0.99999994f)), faint); // of those that stay, as random as before
+        u = select(u, fmin(u / chance, (Real)(0.99999994f)), faint); // uniform again for the paths that stay
         ends |= faint & ~stays;
         goes_on &= ~(faint & ~stays);
     }
@@ -111,7 +111,7 @@ static inline Mask scatter(constant const View *view, constant const Scattering 
         Real3 light = scale3(times3(leaves, ray.light), density * share / l.chance);
         aims = goes_on & MASK(magnitude(light) > 0.0f);
 #if DENSITY == DENSITY_CONSTANT
-        // In closed form without a flight.
+        // The transmittance is known in closed form, without a flight.
         add_light(&path->light, times3(light, box_transmittance(view, params, f->p, ray.d, ray.length)), aims);
         aims = (Mask)(0);
 #else
@@ -123,7 +123,7 @@ static inline Mask scatter(constant const View *view, constant const Scattering 
     return ends;
 }
 
-// Flights that have come to their end or left the volume. Returns the paths that have ended.
+// Handles flights that have reached their end or left the volume. Returns the paths that have ended.
 static inline Mask arrive(constant const View *view, constant const Scattering *params, global const float *table, Mask over, Int face, Path *path,
                           Mask *elsewhere) {
     Flight *f = &path->flight;
@@ -148,7 +148,7 @@ static inline Mask arrive(constant const View *view, constant const Scattering *
     return out;
 }
 
-// What a tile leaves to the next launch; the pixels that it has taken are in the header.
+// The state that a tile leaves to the next launch. The pixels that it has taken are in the header.
 typedef struct { Path path; Mask alive; } TileState;
 STATE_IS(TileState, SCATTERING_STATE_WORDS);
 

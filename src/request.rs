@@ -1,7 +1,7 @@
-//! Wire types: what a client may send, as JSON Schema and serde see it. No defaults are resolved here and nothing is read.
+//! Wire types: the parts of a request, as JSON Schema and serde see them. No defaults are resolved here and nothing is read.
 //!
-//! A body is checked against the very schema that is served (`schema`), so what the documentation permits and what the
-//! server permits cannot drift apart; what a schema cannot say is checked when the [`crate::render::Scene`] is made.
+//! A body is checked against the very schema that is served (`schema`), so that documentation and server cannot differ. Rules that a schema cannot
+//! express are checked when the [`crate::render::Scene`] is made.
 
 mod check;
 mod schema;

@@ -1,5 +1,5 @@
-// Which pixels a work-item of a view renders: a beam of BEAM_W x BEAM_H packets of TILE_W x TILE_H pixels, so that neighbours
-// find each other's voxels in the nearest cache.
+// The pixels that a work-item of a view renders: a beam of BEAM_W x BEAM_H packets of TILE_W x TILE_H pixels, so that neighbours find each other's
+// voxels in the nearest cache.
 #ifndef SHARED_BEAM_H
 #define SHARED_BEAM_H
 

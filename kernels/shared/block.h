@@ -1,5 +1,5 @@
-// Samples of 16 or 8 lanes that are within NARROW voxels of each other read the same 4 x 4 x 4 voxels: these are loaded row by row for all
-// lanes, and read by permutations. Gathers lane by lane cost two to four times as much.
+// Samples of 16 or 8 lanes that are within NARROW voxels of each other read the same 4 x 4 x 4 voxels. These are loaded row by row for all lanes, and
+// read by permutations. Gathers lane by lane cost two to four times as much.
 #ifndef SHARED_BLOCK_H
 #define SHARED_BLOCK_H
 
@@ -20,10 +20,10 @@ static inline int4 load_rows(global const uchar *from, int row) {
     return (int4)(INT_AT(from), INT_AT(from + row), INT_AT(from + 2 * row), INT_AT(from + 3 * row));
 }
 
-// Gradients come from blocks, too, where they are worth their loads.
+// Gradients come from blocks as well if these are worth their loads.
 #define NARROW_GRADIENTS (SHADED && LANES == 16)
 #if NARROW_GRADIENTS
-// Voxels that are read before and after the block, and the fewest a side that this leaves room for.
+// Voxels that are read before and after the block, and the fewest voxels per side of a volume with room for them.
 #define AROUND 1
 #define NARROW_LEAST 6
 #else
@@ -55,7 +55,7 @@ typedef struct { Int voxels, rows, bytes; } Block;
 #define BLOCK_ROW(b, at) __builtin_ia32_permvarsi512((b)->voxels, at)
 #elif VOXEL == VOXEL_U8
 typedef struct { Int low, high, rows, bytes; } Block;
-// Bit 3 of a row's number says in which of them it is.
+// Bit 3 of a row's number selects the register.
 #define BLOCK_ROW(b, at) select(__builtin_ia32_permvarsi256((b)->low, at), __builtin_ia32_permvarsi256((b)->high, at), (at) << 28)
 #elif VOXEL == VOXEL_F32
 typedef struct { Real sheet[4]; int first; } Block;
@@ -67,7 +67,7 @@ static inline long4 load_wide_rows(global const uchar *from, int row) {
     return (long4)(LONG_AT(from), LONG_AT(from + row), LONG_AT(from + 2 * row), LONG_AT(from + 3 * row));
 }
 
-// From the address of its lowest corner, and the terms that lead to its rows, bytes and words.
+// A block from the address of its lowest corner, and the terms that lead to its rows, bytes and words.
 static inline Block block_from(constant const View *view, global const uchar *from, int rows, int bytes, int words) {
     int row = view->dims[0] * VOXEL_BYTES, sheet = view->dims[1] * row;
     Block b;
@@ -98,8 +98,8 @@ static inline Block block_at(constant const View *view, VOLUME voxels, const Blo
 }
 
 #if VOXEL == VOXEL_F32
-// Interpolates in the block, by the arithmetic of inner_raw. Of the three sheets that the lanes' nearer voxels are on a permutation reads two,
-// and another, in the lanes that are there, the third; so for the farther ones.
+// Interpolates in the block, by the arithmetic of inner_raw. The lanes' nearer voxels lie on three sheets. One permutation reads two of them, and
+// another reads the third in the lanes that need it. The farther voxels are read likewise.
 static inline Real block_raw(const Block *b, Real3 p) {
     Int ix = to_int(p.x), iy = to_int(p.y), iz = to_int(p.z), at = (iz << 4) + (iy << 2) + ix + b->first;
     Real fx = p.x - to_real(ix), fy = p.y - to_real(iy), fz = p.z - to_real(iz);
@@ -147,8 +147,8 @@ static inline Real narrow_raw(constant const View *view, VOLUME voxels, Real3 p,
 }
 
 #if NARROW_GRADIENTS && VOXEL == VOXEL_U8
-// For gradients the block with what is around it: its rows from a voxel before to three after, two registers of eight, and four rows
-// each beside it: before and after in y for each z, before and after in z for each y.
+// The block of a gradient, with its surroundings: its rows from a voxel before to three after, two registers of eight, and four rows each beside it:
+// before and after in y for each z, before and after in z for each y.
 typedef struct { long8 low, high; Int beside; } WideBlock;
 
 static inline WideBlock wide_block_at(constant const View *view, global const uchar *from) {
@@ -160,15 +160,15 @@ static inline WideBlock wide_block_at(constant const View *view, global const uc
     return b;
 }
 
-// Rows in pairs, row z * 4 + y after the one before: of the block's first eight a pair in each quarter of a register, and of its last
-// eight a pair behind each. So what unpack instructions take from all quarters, first the lower halves, then the upper, is in order.
+// Deals rows in pairs, row z * 4 + y after the one before: each quarter of a register gets a pair of the block's first eight rows, and behind each
+// stands a pair of its last eight. So the result of unpack instructions on all quarters, first the lower halves, then the upper, is in order.
 #define DEALT(v, w) __builtin_shufflevector(v, w, 0, 2, 16, 18, 4, 6, 20, 22, 8, 10, 24, 26, 12, 14, 28, 30)
 #define ROW_AFTER(v, w) __builtin_shufflevector(v, w, 1, 4, 3, 6, 5, 20, 7, 22, 9, 12, 11, 14, 13, 21, 15, 23)
 #define ROW_BEFORE(v, w) __builtin_shufflevector(v, w, 16, 0, 18, 2, 1, 4, 3, 6, 17, 8, 19, 10, 9, 12, 11, 14)
 #define SHEET_AFTER(v, w) __builtin_shufflevector(v, w, 8, 9, 10, 11, 12, 13, 14, 15, 2, 3, 28, 29, 6, 7, 30, 31)
 #define SHEET_BEFORE(v, w) __builtin_shufflevector(v, w, 24, 25, 8, 9, 26, 27, 12, 13, 0, 1, 2, 3, 4, 5, 6, 7)
 
-// The rows from x voxels beside the block's lowest corner on, dealt.
+// The rows that start x voxels beside the block's lowest corner, dealt.
 static inline Int wide_rows(const WideBlock *b, int x) {
     return DEALT(as_int16(b->low >> (8 * x + 8)), as_int16(b->high >> (8 * x + 8)));
 }
@@ -195,8 +195,8 @@ static inline Real field_between(Field f, Int pair, const Inner *i) {
     #undef PAIR
 }
 
-// The gradient by central differences in step k of eight: the differences at the block's voxels are worked out once for all lanes, and
-// what lies between them is interpolated for each.
+// The gradient by central differences in step k of eight. The differences at the block's voxels are computed once for all lanes, and interpolated for
+// each.
 static inline Real3 narrow_gradient(constant const View *view, VOLUME voxels, const BlockOffsets *offsets, int k, Inner i) {
     WideBlock b = wide_block_at(view, voxels + offsets->offset[k]);
     Int word = (i.z << 4) + (i.y << 2) + i.x + offsets->words[k], pair = (word | (word << 16)) + 0x10000;
@@ -207,7 +207,7 @@ static inline Real3 narrow_gradient(constant const View *view, VOLUME voxels, co
     return real3(field_between(x, pair, &i), field_between(y, pair, &i), field_between(z, pair, &i));
 }
 #elif NARROW_GRADIENTS
-// The gradient by central differences in step k of eight: the differences of the blocks a voxel to each side.
+// The gradient by central differences in step k of eight, from the blocks one voxel to each side.
 static inline Real3 narrow_gradient(constant const View *view, VOLUME voxels, const BlockOffsets *offsets, int k,
 #if INNER_WHOLE
                                     Inner i) {

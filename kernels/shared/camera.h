@@ -1,5 +1,5 @@
-// Rays of a view. The host gives, in double precision, a plane near the volume: a ray goes through the plane's point of
-// its pixel, which keeps its digits however far away the eye is (an eye at 10^6 units would lose them all).
+// Rays of a view. The host gives, in double precision, a plane near the volume. A ray goes through its pixel's point on the plane, which keeps its
+// digits however far away the eye is (an eye at 10^6 units would lose them all).
 //   point(i, j)  = view->plane + i view->right + j view->down             in index units
 //   towards      = the same less the eye (perspective) or constant (orthographic), in index units and in world units
 // The parameter t is in world units, 0 on the plane; the eye is at t = -t_eye.
@@ -24,8 +24,7 @@ static inline Real3 affine3(constant const float *base, constant const float *ri
     return real3(affine(base, right, down, 0, x, y), affine(base, right, down, 1, x, y), affine(base, right, down, 2, x, y));
 }
 
-// Clips t to the slab low <= origin + t direction <= high. A component of 0 is moved off it, so that 0 times infinity does not
-// occur.
+// Clips t to the slab low <= origin + t direction <= high. A component of 0 is moved off it, so that 0 times infinity does not occur.
 static inline void clip_slab(Real origin, Real direction, float low, float high, Real *t_near, Real *t_far) {
     Real d = select(direction, copysign((Real)(1e-20f), direction), MASK(fabs(direction) < 1e-20f));
     Real inverse = 1.0f / d;

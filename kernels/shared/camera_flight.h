@@ -1,4 +1,4 @@
-// Flights along the camera's rays: where each begins, and how far it goes through the volume.
+// Flights along the camera's rays: the start of each, and its length in the volume.
 #ifndef SHARED_CAMERA_FLIGHT_H
 #define SHARED_CAMERA_FLIGHT_H
 
@@ -7,7 +7,7 @@
 #include "shared/lanes.h"
 #include "shared/rng.h"
 
-typedef struct { Mask meets; Real eye, entry, length; UInt number; } CameraFlight; // of the volume from the eye, and a number that is left
+typedef struct { Mask meets; Real eye, entry, length; UInt number; } CameraFlight; // t of eye and entry, length, a spare number
 
 // Begins a flight from the eye through a pixel in each lane of `fresh`.
 static inline CameraFlight begin_camera_flight(constant const View *view, constant const Scattering *params, float2 offset, Int column, Int row, Mask fresh, Flight *f) {

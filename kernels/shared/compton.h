@@ -12,7 +12,7 @@
 
 typedef struct { Real extinction, albedo; } Attenuation; // per mm; the part that is Compton scattering
 
-// A medium's row at an energy; rows are even in its logarithm, from params->gamma_least_kev to the source's energy.
+// The row of a medium at an energy. Rows are even in the logarithm of energy, from params->gamma_least_kev to the source's energy.
 static inline Attenuation attenuation_at(constant const PhotonTransport *params, global const float *table, Int medium, Real energy) {
     Real x = clamp((log2(energy) - params->gamma_least_log2) * params->gamma_rows_per_log2, (Real)(0.0f), (Real)(GAMMA_ROWS - 1.001f));
     Int row = to_int(x), at = params->at_gamma + (medium * GAMMA_ROWS + row) * 2;
@@ -24,7 +24,7 @@ static inline Attenuation attenuation_at(constant const PhotonTransport *params,
 
 // The part of its energy that a photon keeps, and 1 - cosine of its angle: by composition and rejection from
 //   d sigma / d eps ~ (1 / eps + eps) (1 - eps sin^2 / (1 + eps^2)),  eps = E' / E
-// (Butcher & Messel, Nucl. Phys. 20, 1960). Three of four tries succeed at worst.
+// (Butcher & Messel, Nucl. Phys. 20, 1960). At worst three of four tries succeed.
 static inline Real compton(constant const FieldPass *pass, const Photon *photon, Real energy, Mask on, Real *one_minus) {
     Real k = energy * (1.0f / ELECTRON_KEV), least = 1.0f / mad((Real)(2.0f), k, (Real)(1.0f));
     Real a1 = -log(least), a2 = 0.5f * mad(-least, least, (Real)(1.0f)), kept = (Real)(1.0f), minus = (Real)(0.0f);

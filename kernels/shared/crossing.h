@@ -23,7 +23,7 @@ static inline Bracket select_bracket(Bracket no, Bracket yes, Mask m) {
     return b;
 }
 
-// The lanes that pass the isovalue. With `nearest`, as in the lecture, those whose far end is at or beyond it.
+// The lanes that pass the isovalue. With `nearest`, as in the lecture, these are the lanes whose far end is at or beyond it.
 static inline Mask crossed(constant const Isosurface *params, const Bracket *b) {
 #if INTERPOLATION == INTERPOLATION_NEAREST
     return MASK(params->sign * b->f1 >= 0.0f);
@@ -34,12 +34,12 @@ static inline Mask crossed(constant const Isosurface *params, const Bracket *b) 
 #endif
 }
 
-// Falling back to halves after so many steps of regula falsi bounds their number for any function.
+// The steps of regula falsi before halving: they bound the number of steps for any function.
 #define REGULA_FALSI 10
 #define REFINEMENTS 28
 
-// The crossing in the bracket by regula falsi in the Illinois form, which halves the value of an end that stays (Dowell & Jarratt,
-// BIT 11, 1971), until the bracket is `tolerance` wide, and once more linearly within it.
+// The crossing in the bracket by regula falsi in the Illinois form, which halves the value of an end that stays (Dowell & Jarratt, BIT 11, 1971). It
+// stops when the bracket is `tolerance` wide, and interpolates once more linearly within it.
 static inline Real refined(constant const View *view, constant const Isosurface *params, VOLUME voxels, const Packet *p, Bracket b, Mask on) {
 #if INTERPOLATION == INTERPOLATION_NEAREST
     return b.t1;
@@ -83,13 +83,13 @@ static inline Real3 surface_gradient(constant const View *view, VOLUME voxels, i
     return gradient_raw(view, voxels, at);
 }
 
-// The part of the sky over the surface that other surfaces hide within the radius, by rays with the cosine's density (Zhukov,
-// Iones, Kronin, "An Ambient Light Illumination Model", Rendering Techniques 1998). What is clipped away hides nothing.
+// The part of the sky over the surface that other surfaces hide within the radius, by rays with the cosine's density (Zhukov, Iones, Kronin, "An
+// Ambient Light Illumination Model", Rendering Techniques 1998). Clipped-away surfaces hide nothing.
 static inline Real occlusion(constant const View *view, constant const Isosurface *params, VOLUME voxels, const Packet *p, const Bracket *b,
                              Real3 at, Real3 ray, Real3 gradient, Mask on) {
     Real squared = dot3(gradient, gradient);
     on &= MASK(squared > view->flat_squared);
-    // Towards the eye; a frame around it (Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 6(1), 2017).
+    // The normal towards the eye, and a frame around it (Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 6(1), 2017).
     Real scale = copysign(rsqrt(select((Real)(1.0f), squared, on)), -dot3(gradient, ray));
     Real3 n = scale3(gradient, scale);
     Real sign = copysign((Real)(1.0f), n.z), a = -1.0f / (sign + n.z), c = n.x * n.y * a;

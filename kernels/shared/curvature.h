@@ -71,7 +71,7 @@ static inline Symmetric congruent(constant const float *m, Symmetric h) {
     return s;
 }
 
-// The principal curvatures (first >= second), per world unit, from the world gradient and Hessian; 0 where it is flat.
+// The principal curvatures (first >= second), per world unit, from the world gradient and Hessian; 0 where the field is flat.
 static inline Curvature curvature(constant const View *view, Real3 g, Symmetric h) {
     Real squared = dot3(g, g);
     Mask flat = MASK(!(squared > view->flat_squared));

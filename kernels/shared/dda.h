@@ -1,5 +1,5 @@
-// Cells of one size along each axis, crossed from boundary to boundary (DDA), and the classification of tentative collisions, which are
-// drawn with a majorant. TRACKING says how a free path is found:
+// Cells of one size along each axis, crossed from boundary to boundary (DDA), and the classification of tentative collisions, which are drawn with a
+// majorant. TRACKING selects the way to find a free path:
 //   EXACT    cells are as large as the extinction is constant (Amanatides & Woo, Eurographics 1987, for voxels): tau = sum sigma_i s_i
 //   MARCH    steps of one length, each with the extinction at its start; a path ends with the step that uses it up
 //   DELTA    cells are coarse blocks, tentative collisions by the block's majorant m, real ones with probability sigma / m
@@ -31,7 +31,7 @@ static inline Real distance_to(Real boundary, Real p, Real d) {
 }
 
 #if BY_MAJORANTS
-// Classifies the tentative collisions `hit` by the number u. Returns the real ones; weights are to be multiplied by *factor.
+// Classifies the tentative collisions `hit` by the number u. Returns the real ones; weights have to be multiplied by *factor.
 static inline Mask real_collisions(Real sigma, Real rate, Real u, Mask hit, Real *factor) {
 #if TRACKING == TRACKING_DELTA
     *factor = (Real)(1.0f);

@@ -7,11 +7,11 @@
 #include "shared/medium.h"
 #include "shared/tally.h"
 
-// The grid's sums. If the work-item owns them, it needs neither atomics nor branches, and each deposit is added with the next one: its
+// The grid's sums. If the work-item owns them, it needs neither atomics nor branches, and each deposit is added together with the next one: its
 // addresses, which are all over the grid, are fetched meanwhile. Waiting for them took a third of the time.
 typedef struct { global ulong *sums; int own; Int idle; IntLanes to; ULongLanes amount; } Grid;
 
-// Clang for a processor knows how; oclgrind, which is for none, does not.
+// Clang has the prefetch builtin if it compiles for a processor; oclgrind, which compiles for none, does not.
 #if LANES > 1 && (defined(__x86_64__) || defined(__aarch64__))
 #define FETCH_TO_WRITE(address) __builtin_prefetch((const void *)(size_t)(address), 1)
 #else
@@ -44,7 +44,7 @@ static inline void grid_add(Grid *g, Int voxel, ULong amount, Mask active) {
 
 // Adds a collision's deposit to the grid.
 static inline void deposit(constant const PhotonTransport *params, Grid *grid, Int voxel, Real3 p, ULong amount, Mask hit) {
-    // Layers and boundaries that have no end extend beyond the grid.
+    // Layers and boundaries without an end extend beyond the grid.
     if (params->endless) {
         hit &= MASK(p.x >= 0.0f) & MASK(p.x <= params->size_mm[0]) & MASK(p.y >= 0.0f) & MASK(p.y <= params->size_mm[1]);
         hit &= MASK(p.z >= 0.0f) & MASK(p.z <= params->size_mm[2]);
@@ -53,14 +53,14 @@ static inline void deposit(constant const PhotonTransport *params, Grid *grid, I
 }
 
 #if !VOXEL_CELLS
-// Voxels that are outside of the grid on the side that the flight goes to.
+// The lanes whose voxel is outside of the grid on the side towards which the flight goes.
 static inline Mask beyond(Int voxel, Int up, int voxels) { return select(MASK(voxel < 0), MASK(voxel >= voxels), MASK(up != 0)); }
 
-// Shares a straight flight out among the voxels that it crosses: weight times length, times the absorption for absorbed energy.
+// Distributes a straight flight over the voxels that it crosses: weight times length, times the absorption for absorbed energy.
 static inline void deposit_track(constant const PhotonTransport *params, global const float *table, Grid *grid, Real3 p, Real3 d,
                                  Real length, Real weight, Mask on) {
     Real t = (Real)(0.0f);
-    // Voxels' planes by their number, so that no plane is met twice.
+    // Planes have the numbers of their voxels, so that no plane is met twice.
     Int x = to_int(floor(p.x * params->voxels_per_mm[0])), y = to_int(floor(p.y * params->voxels_per_mm[1])), z = to_int(floor(p.z * params->voxels_per_mm[2]));
     Int up_x = -MASK(d.x > 0.0f), up_y = -MASK(d.y > 0.0f), up_z = -MASK(d.z > 0.0f);
     for (int i = 0; i < params->most_steps && any_lane(on); i++) {

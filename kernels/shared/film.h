@@ -1,7 +1,7 @@
-// The film: per pixel the mean of linear RGB and alpha over the samples, and M2, the sum of squared deviations of
-// the luminance (Welford, "Note on a method for calculating corrected sums of squares and products", Technometrics 4,
-// 1962: sums and sums of squares that do not cancel). Layout: 4 floats a pixel, then one M2 a pixel. A sample that is not finite is
-// taken as black and counted, and its pixel's M2 is no number from then on: its error is not known.
+// The film: per pixel the mean of linear RGB and alpha over the samples, and M2, the sum of squared deviations of the luminance (Welford, "Note on a
+// method for calculating corrected sums of squares and products", Technometrics 4, 1962: sums and sums of squares that do not cancel). Layout: 4
+// floats per pixel, then one M2 per pixel. A sample that is not finite is taken as black and counted. Its pixel's M2 is NaN from then on: its error
+// is not known.
 #ifndef SHARED_FILM_H
 #define SHARED_FILM_H
 
@@ -24,7 +24,7 @@ static inline void film_add(global float *film, global uint *counts, int pixel, 
     film[4 * pixels + pixel] = m2;
 }
 
-// One sample of each of a packet's pixels.
+// Adds one sample of each of a packet's pixels.
 static inline void film_packet(constant const View *view, global float *film, global uint *counts, Int column, Int row, Real3 colour,
                                Real alpha) {
     RealLanes red, green, blue, opacity;

@@ -1,6 +1,6 @@
-// Flights of light through a volume whose values are densities: the position, direction and throughput of each lane. Positions
-// are in index units, lengths in world units. A free flight ends at a real collision, or where it leaves the volume; a ratio flight goes
-// a given length and estimates the transmittance along it (tracker.h).
+// Flights of light through a volume whose values are densities: the position, direction and throughput of each lane. Positions are in index units,
+// lengths in world units. A free flight ends at a real collision, or at its exit from the volume; a ratio flight goes a given length and estimates
+// the transmittance along it (tracker.h).
 #ifndef SHARED_FLIGHT_H
 #define SHARED_FLIGHT_H
 
@@ -16,13 +16,13 @@ typedef struct {
     Real3 p, d, way;     // position; direction, of unit length in the world; the same in index units per world unit
     Real3 inverse;       // 1 / way
     Cell cell;
-    Real depth;          // what is left of the free path, in optical depth
+    Real depth;          // the rest of the free path, in optical depth
     Real left;           // the length to the end of the flight
     Real3 throughput;    // of the path, or the light that a ratio flight brings
     Real weight;         // of the flight, which multiplies the throughput
     Mask ratio;
     uint sample;         // keys the random numbers, with
-    UInt number, event;  // the pixel, and what has happened on its path
+    UInt number, event;  // the pixel, and the number of events on its path
 } Flight;
 
 // Four random numbers of a path's next event; `what` numbers the draws of one event.
@@ -77,7 +77,7 @@ static inline void aim(constant const View *view, constant const Scattering *par
     f->cell.z = select(f->cell.z, cell_on_axis(f->p.z, 0.0f, params->cells_per_voxel[2], params->cells[2]), aimed);
 }
 
-// Begins free flights of the lanes of `on` from p in the direction d with a throughput: they end where they collide or leave.
+// Begins free flights of the lanes of `on` from p in the direction d with a throughput. They end at a collision or at the exit.
 static inline void fly_on(Real3 p, Real3 d, Real3 throughput, Real depth, Mask on, Flight *f) {
     f->p = select3(f->p, p, on);
     f->d = select3(f->d, d, on);
@@ -88,7 +88,7 @@ static inline void fly_on(Real3 p, Real3 d, Real3 throughput, Real depth, Mask o
     f->ratio &= ~on;
 }
 
-// Begins ratio flights along a length, whose weight becomes the transmittance.
+// Begins ratio flights along a length. Their weight becomes the transmittance.
 static inline void fly_to(Real3 p, Real3 d, Real length, Real3 throughput, Real depth, Mask on, Flight *f) {
     fly_on(p, d, throughput, depth, on, f);
     f->left = select(f->left, length, on);

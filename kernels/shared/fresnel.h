@@ -1,5 +1,5 @@
-// The reflectance of an interface for unpolarised light at cosine `cos_in`, with eta = index before / index after; *cos_out is the cosine
-// behind it. 1 - eta^2 sin^2 is written so that it loses no digits at grazing incidence.
+// The reflectance of an interface for unpolarised light at cosine `cos_in`, with eta = index before / index after; *cos_out is the cosine behind it.
+// The form of 1 - eta^2 sin^2 loses no digits at grazing incidence.
 #ifndef SHARED_FRESNEL_H
 #define SHARED_FRESNEL_H
 

@@ -1,5 +1,5 @@
-// What a kernel is given of a volume's voxels: a buffer of bytes; on a GPU a 3D image, whose sampler interpolates in hardware (its weights
-// have 8 fractional bits).
+// The type of a volume's voxels as a kernel's argument: a buffer of bytes, or on a GPU a 3D image, whose sampler interpolates in hardware (its
+// weights have 8 fractional bits).
 #ifndef SHARED_IMAGE_H
 #define SHARED_IMAGE_H
 

@@ -1,6 +1,6 @@
-// Samples of packets whose lanes are all at least INNER_MARGIN voxels away from the box's faces: no clamps. A position is
-// given by inner_position, and values are in units of INNER_UNIT. Bytes and words are weighed in whole numbers, with weights of 15 bits that
-// add up to all of it: exact to some 2^-15 of their differences, and the same to the last bit for any number of lanes.
+// Samples of packets whose lanes are all at least INNER_MARGIN voxels away from the box's faces: no clamps. Positions come from inner_position, and
+// values are in units of INNER_UNIT. Bytes and words are weighed in whole numbers. Their weights have 15 bits and sum to exactly 1: values are exact
+// to some 2^-15 of their differences, and the same to the last bit for any number of lanes.
 #ifndef SHARED_INNER_H
 #define SHARED_INNER_H
 
@@ -8,7 +8,7 @@
 #include "shared/volume.h"
 
 #define INNER_MARGIN 1.51f
-// A gradient by central differences comes in units of this a voxel.
+// The unit, per voxel, of a gradient by central differences.
 #define GRADIENT_UNIT (0.5f * INNER_UNIT)
 
 #if INTERPOLATION == INTERPOLATION_TRILINEAR && VOXEL != VOXEL_F32 && !VOLUMES_ARE_IMAGES
@@ -16,11 +16,11 @@
 #define INNER_UNIT (1.0f / 32767.0f)
 // A position has 16 fractional bits.
 #define INNER_SCALE 65536.0f
-// Truncation takes half of the last bit off a position on the average, and as much off half of its product with a weight.
+// Truncation takes half of the last bit off a position on average, and as much off half of its product with a weight.
 #define INNER_ROUNDING 1.0f
 
 #if VOXEL == VOXEL_U16
-// Words without a sign are weighed with one, half of their range below; WHOLE puts it back.
+// Unsigned words are weighed as signed ones, half of their range below; WHOLE adds it again.
 #define WORD_SIGNS ((int)0x80008000)
 #define WHOLE(sum) to_real((sum) + 0x8000 * 0x7fff)
 #else
@@ -28,7 +28,7 @@
 #define WHOLE(sum) to_real(sum)
 #endif
 
-// Weights as words, two of them multiplied and added by one instruction: a register of lanes at AVX-512 and at AVX2.
+// Weights are words. One instruction multiplies and adds two of them: a register of lanes at AVX-512 and at AVX2.
 #if LANES == 16 && defined(__AVX512BW__) && __has_builtin(__builtin_ia32_pmaddwd512)
 #define WEIGHTS_ARE_WORDS 1
 #define LEVEL_BUILTIN(name) JOIN(__builtin_ia32_##name, 512)
@@ -42,19 +42,19 @@
 #if WEIGHTS_ARE_WORDS
 typedef short Words __attribute__((ext_vector_type(2 * LANES)));
 typedef char Bytes __attribute__((ext_vector_type(4 * LANES)));
-typedef Words Weights; // those of two voxels side by side in x
+typedef Words Weights; // the weights of two voxels side by side in x
 #define AS_WORDS(v) __builtin_astype(v, Words)
 #define SHUFFLE(v, order) __builtin_astype(LEVEL_BUILTIN(pshufb)(__builtin_astype(v, Bytes), __builtin_astype(order, Bytes)), Words)
 #define MULTIPLY_ADD(a, b) __builtin_astype(LEVEL_BUILTIN(pmaddwd)(a, b), Int)
-// The bytes 0 and 1 of each lane as two words.
+// The order that makes the bytes 0 and 1 of each lane two words.
 #define PAIR_ORDER REPEATED(0x80018000, 0x80058004, 0x80098008, 0x800d800c)
 // The low word of each lane in both, and the high one.
 #define BOTH(v) SHUFFLE(v, REPEATED(0x01000100, 0x05040504, 0x09080908, 0x0d0c0d0c))
 #define BOTH_HIGH(v) SHUFFLE(v, REPEATED(0x03020302, 0x07060706, 0x0b0a0b0a, 0x0f0e0f0e))
 
-// Those at the fraction of x.
+// The weights at the fraction of x.
 static inline Weights weights_at(Int x) {
-    // (1 - f, f) as words
+    // The pair (1 - f, f) as words.
     Int f = __builtin_astype(BOTH(x >> 1), Int);
 #if LANES == 16
     return AS_WORDS(__builtin_ia32_pternlogd512_mask(f, (Int)(0x7fff7fff), (Int)(0x7fff), 0x6a, (short)-1));
@@ -63,13 +63,13 @@ static inline Weights weights_at(Int x) {
 #endif
 }
 
-// The part of them that the fraction of `position` gives to the farther of two.
+// The part of the weights that the fraction of `position` gives to the farther of two voxels.
 static inline Weights farther(Weights w, Int position) { return LEVEL_BUILTIN(pmulhuw)(w, BOTH(position)); }
 
 static inline Weights less(Weights w, Weights part) { return w - part; }
 
 #if VOXEL == VOXEL_U8
-// The bytes n and n + 1 of each lane's word, weighed.
+// The weighted sum of the bytes n and n + 1 of each lane's word.
 static inline Int weigh(Int word, int n, Weights w) { return MULTIPLY_ADD(SHUFFLE(word, PAIR_ORDER + n * 0x10001), w); }
 #else
 static inline Int weigh(Int word, int n, Weights w) { return MULTIPLY_ADD(AS_WORDS(word ^ WORD_SIGNS), w); }
@@ -152,15 +152,15 @@ static inline Real inner_raw(constant const View *view, VOLUME voxels, Real3 p) 
 // The four rows of voxels around a position.
 typedef struct { Int here, below, behind, beyond; } Rows;
 
-// The gradient by central differences, in floats beyond x, with the rows that a value needs. Twelve gathers of bytes, or twenty of
-// words, instead of the 28 of seven values: a gather of four bytes in x serves three of them, and rows are shared.
+// The gradient by central differences, in floats beyond x, with the rows that a value needs. It takes twelve gathers of bytes, or twenty of words,
+// instead of the 28 of seven values: a gather of four bytes in x serves three of them, and rows are shared.
 static inline Real3 inner_slopes(constant const View *view, VOLUME voxels, Inner i, Rows *rows) {
     Int at = inner_offset(view, i);
     Weights all = weights_at(i.at.x);
     Real fy = to_real(i.at.y & 0xffff) * 0x1p-16f, fz = to_real(i.at.z & 0xffff) * 0x1p-16f;
     int row = view->dims[0] * VOXEL_BYTES, sheet = view->dims[1] * row;
 #if VOXEL == VOXEL_U8
-    global const uchar *from = voxels - 1; // the lanes are a voxel or more inside
+    global const uchar *from = voxels - 1; // the lanes are at least a voxel inside
     #define LINE_BYTE 1
     #define SLOPE(y, z, v) to_real(weigh(v, 2, all) - weigh(v, 0, all))
 #else
@@ -228,7 +228,7 @@ static inline Real3 inner_gradient_at(constant const View *view, VOLUME voxels, 
     return gradient;
 }
 
-// A displacement or a position in index units, scaled for inner_raw: positions count from the middle of voxel 0.
+// A displacement or a position in index units, scaled for inner_raw. Positions count from the middle of voxel 0.
 static inline Real3 inner_way(Real3 way) { return scale3(way, (Real)(INNER_SCALE)); }
 static inline Real3 inner_position(Real3 p) {
     Real3 position = inner_way(real3(p.x - 0.5f, p.y - 0.5f, p.z - 0.5f));

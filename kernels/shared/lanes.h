@@ -1,7 +1,7 @@
-// Lanes: the same kernel text runs on packets of LANES rays or photons (PoCL on a CPU does not vectorise divergent
-// loops, so the packet is written out in vector types) and on single ones (LANES 1, the fast form on a GPU).
-//   Real, Int, UInt   one float, int, uint a lane
-//   Mask              an Int that is -1 (yes) or 0 (no) a lane; made by MASK(a < b), joined by & | ~
+// Lanes: the same kernel text runs on packets of LANES rays or photons (PoCL on a CPU does not vectorise divergent loops, so the packet is written
+// out in vector types) and on single ones (LANES 1, the fast form on a GPU).
+//   Real, Int, UInt   one float, int, uint per lane
+//   Mask              an Int that is -1 (yes) or 0 (no) per lane; made by MASK(a < b), joined by & | ~
 //   Real3             three Reals; lane types have no vector form of their own
 //   any_lane(mask)    true if any lane says yes
 // select(no, yes, mask) is OpenCL's own and means the same for LANES 1 and more.
@@ -52,7 +52,7 @@ typedef struct { Real x, y, z; } Real3;
 #define LANE_IDS ((Int)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15))
 #endif
 
-// PoCL's any() takes a long vector lane by lane; one instruction instead makes a ray march a quarter faster.
+// PoCL's any() takes a long vector lane by lane. A single instruction instead makes a ray march a quarter faster.
 #if LANES == 16 && defined(__AVX512DQ__) && __has_builtin(__builtin_ia32_cvtd2mask512)
 static inline int any_lane(Mask m) { return __builtin_ia32_cvtd2mask512(m) != 0; }
 #elif LANES == 8 && defined(__AVX2__) && __has_builtin(__builtin_ia32_movmskps256)
@@ -87,8 +87,8 @@ static inline int count_lanes(Mask m) {
 #endif
 }
 
-// ULong: 64 bits a lane, in two vectors of half the lanes each. So no vector is wider than the level's registers: one that is
-// crosses a function's boundary in memory, and compilers do not agree how (clang's -Wpsabi).
+// ULong: 64 bits per lane, in two vectors of half the lanes each. So no vector is wider than the level's registers: a wider one crosses a function's
+// boundary in memory, and compilers do not agree on the way (clang's -Wpsabi).
 #if LANES == 1
 typedef struct { ulong all; } ULong;
 static inline ULong ulong_zero(void) { ULong r = {0}; return r; }
@@ -129,7 +129,7 @@ static inline ULong ulong_where(Mask m, ULong v) {
 #endif
 typedef union { ULong v; ulong lane[LANES]; } ULongLanes;
 
-// The lesser and the greater of two; b where a is not a number.
+// The lesser and the greater of two; b if a is NaN.
 #define LESSER(a, b) ((a) < (b) ? (a) : (b))
 #define GREATER(a, b) ((a) > (b) ? (a) : (b))
 
@@ -152,7 +152,7 @@ static inline float least_lane(Real v) {
 
 static inline float greatest_lane(Real v) { return -least_lane(-v); }
 
-// One load wherever it lies, of any alignment: of vload4 and the like PoCL makes several.
+// A type for one load from any address, of any alignment: PoCL makes several loads of vload4 and the like.
 typedef struct __attribute__((packed)) { int word; } UnalignedInt;
 typedef struct __attribute__((packed)) { long word; } UnalignedLong;
 typedef struct __attribute__((packed)) { float4 four; } UnalignedFloat4;
@@ -162,8 +162,8 @@ typedef struct __attribute__((packed)) { Real lanes; } UnalignedReal;
 #define FOUR_AT(from) ((global const UnalignedFloat4 *)(from))->four
 #define REALS_AT(from) ((global const UnalignedReal *)(from))->lanes
 
-// gather_words(base, byte_offset): 32 bits from base + byte_offset, unaligned, a lane.
-// One AVX-512 or AVX2 instruction where clang has it; plain loads elsewhere. The buffer is padded by 8 bytes.
+// gather_words(base, byte_offset): for each lane 32 bits from base + byte_offset, unaligned. It is one AVX-512 or AVX2 instruction if clang has it;
+// plain loads elsewhere. The buffer is padded by 8 bytes.
 #if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_gathersiv16si)
 static inline Int gather_words(global const uchar *base, Int byte_offset) {
     return __builtin_ia32_gathersiv16si((Int)(0), (const void *)(size_t)base, byte_offset, (short)-1, 1);
@@ -188,7 +188,7 @@ static inline Int gather_words(global const uchar *base, Int byte_offset) {
 #endif
 #endif
 
-// Two words side by side a lane, from base + byte_offset: half the loads of two gathers.
+// Two adjacent words per lane, from base + byte_offset: half the loads of two gathers.
 static inline void gather_pairs(global const uchar *base, Int byte_offset, Int *first, Int *second) {
 #if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_gathersiv8di)
     long8 low = __builtin_ia32_gathersiv8di((long8)(0), (const void *)(size_t)base, byte_offset.lo, (char)-1, 1);
@@ -196,7 +196,7 @@ static inline void gather_pairs(global const uchar *base, Int byte_offset, Int *
     *first = (Int)(as_int16(low).even, as_int16(high).even);
     *second = (Int)(as_int16(low).odd, as_int16(high).odd);
 #elif LANES == 8 && defined(__AVX2__) && __has_builtin(__builtin_ia32_gatherd_q256)
-    // A shuffle takes words of each half of two registers in turn: it puts lanes that come in this order right.
+    // A shuffle takes words of each half of two registers in turn. It puts lanes that come in this order right.
     int4 from_low = byte_offset.s0145, from_high = byte_offset.s2367;
     int8 low = as_int8(__builtin_ia32_gatherd_q256((long4)(0), (const long *)(size_t)base, from_low, (long4)(-1), 1));
     int8 high = as_int8(__builtin_ia32_gatherd_q256((long4)(0), (const long *)(size_t)base, from_high, (long4)(-1), 1));
@@ -246,7 +246,7 @@ static inline Real inverse_root(Real v) {
 }
 #elif LANES == 8 && defined(__AVX2__) && __has_builtin(__builtin_ia32_rsqrtps256)
 static inline Real inverse_root(Real v) {
-    // Its estimate has two bits less, so it takes another step.
+    // The estimate of this instruction has two bits less, so it takes another step.
     Real r = __builtin_ia32_rsqrtps256(v);
     r *= mad(-0.5f * v * r, r, (Real)(1.5f));
     return r * mad(-0.5f * v * r, r, (Real)(1.5f));
@@ -255,7 +255,7 @@ static inline Real inverse_root(Real v) {
 static inline Real inverse_root(Real v) { return rsqrt(v); }
 #endif
 
-// 1 / v likewise, to one or two units of the last digit; of 0 it is not a number.
+// The reciprocal 1 / v by the same method, to one or two units of the last digit; of 0 it is NaN.
 #if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_rcp14ps512_mask)
 static inline Real reciprocal(Real v) {
     Real r = __builtin_ia32_rcp14ps512_mask(v, (Real)(0.0f), (short)-1);

@@ -4,7 +4,7 @@
 //   LIGHT_POINT   intensity; position
 //   LIGHT_SPHERE  radiance of its outside; position, radius
 //   LIGHT_QUAD    radiance of both sides; corner, edges
-// and a sky that is between its zenith and its horizon. Lights do not hide each other, nor anything else.
+// The sky's radiance is interpolated from its zenith to its horizon. Lights do not hide each other, nor anything else.
 #ifndef SHARED_LIGHT_H
 #define SHARED_LIGHT_H
 
@@ -54,7 +54,7 @@ static inline Real cone_of(Real size, Real squared) {
     return select(sine2 / (1.0f + sqrt(fmax(1.0f - sine2, (Real)(0.0f)))), (Real)(2.0f), MASK(sine2 >= 1.0f));
 }
 
-typedef struct { Real3 d; Real length; Real3 light; Real density; } LightRay; // per steradian; 0 of what no ray meets by chance
+typedef struct { Real3 d; Real length; Real3 light; Real density; } LightRay; // per steradian; 0 if no ray meets the light by chance
 
 // A ray from `at` towards a light by the numbers u and v: its light, divided by the density of the direction.
 static inline LightRay light_ray(const Light *l, Real3 at, Real u, Real v) {
@@ -91,9 +91,9 @@ static inline LightRay light_ray(const Light *l, Real3 at, Real u, Real v) {
     return ray;
 }
 
-// Light of the lights that a ray from `at` meets between the lengths `from` and `to`, each weighed against the chance that its light was aimed at:
-// the balance heuristic (Veach & Guibas, SIGGRAPH 1995), density / (density + chance * its own). No `weighed`: all of it. Where every
-// light is aimed at in its turn (`each`) the chance is 1.
+// The light of the lights that a ray from `at` meets between the lengths `from` and `to`, each weighed against the chance that next-event estimation
+// aimed at it: the balance heuristic (Veach & Guibas, SIGGRAPH 1995), density / (density + chance * its own). Without `weighed` each light counts
+// fully. If every light is aimed at in its turn (`each`) the chance is 1.
 static inline Real3 met(constant const Scattering *params, global const float *table, Real3 at, Real3 d, Real from, Real to, Real density,
                         Mask weighed, int each) {
     Real3 sum = real3((Real)(0.0f), (Real)(0.0f), (Real)(0.0f));
@@ -115,7 +115,7 @@ static inline Real3 met(constant const Scattering *params, global const float *t
             Real squared = dot3(to_light, to_light), along_d = dot3(to_light, d);
             Real3 off = minus3(to_light, scale3(d, along_d));
             Real chord2 = (Real)(l[8] * l[8]) - dot3(off, off);
-            // A flight that began before `at` may have met it there.
+            // A flight that began before `at` may have met the light there.
             seen = MASK(chord2 > 0.0f) & (MASK(squared > l[8] * l[8]) | MASK(from < 0.0f));
             length = along_d - sqrt(fmax(chord2, (Real)(0.0f)));
             own = 1.0f / (TURN * cone_of((Real)(l[8]), squared));
@@ -124,7 +124,7 @@ static inline Real3 met(constant const Scattering *params, global const float *t
             Real facing = mad(n.x, d.x, mad(n.y, d.y, n.z * d.z)), safe = select(facing, (Real)(1e-20f), MASK(fabs(facing) < 1e-20f));
             length = mad(n.x, to_light.x, mad(n.y, to_light.y, n.z * to_light.z)) / safe;
             Real3 on = minus3(scale3(d, length), to_light);
-            // Its two coordinates, by the edges' reciprocal ones.
+            // The light's two coordinates, by the reciprocal vectors of the edges.
             float area2 = dot(n, n);
             float3 ru = cross(v, n) / area2, rv = cross(n, u) / area2;
             Real a = mad(ru.x, on.x, mad(ru.y, on.y, ru.z * on.z)), b = mad(rv.x, on.x, mad(rv.y, on.y, rv.z * on.z));

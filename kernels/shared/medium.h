@@ -1,4 +1,4 @@
-// The media of photons: a box, cut into the cells of a DDA (dda.h). MEDIA says where a medium is,
+// The media of photons: a box, cut into the cells of a DDA (dda.h). MEDIA selects the place of the media,
 //   UNIFORM  one everywhere               LABELS   one per voxel, by its number
 //   LAYERS   one per layer along z        DENSITY  one whose extinction is times a voxel's density
 #ifndef SHARED_MEDIUM_H
@@ -72,14 +72,14 @@ static inline Int cell_voxel(constant const PhotonTransport *params, Cell c) {
 }
 
 #if HAS_CLEARANCE
-// The voxel at a point within the clearance of a cell; rounding must not lead beyond it.
+// The voxel at a point, limited to the clearance of a cell: rounding must not lead beyond it.
 static inline Cell cell_within(constant const PhotonTransport *params, Cell c, Int clearance, Real3 p) {
     Cell at = cell_at(params, 0, p);
     at.x = clamp(at.x, c.x - clearance, c.x + clearance), at.y = clamp(at.y, c.y - clearance, c.y + clearance), at.z = clamp(at.z, c.z - clearance, c.z + clearance);
     return at;
 }
 
-// The medium and clearance of a voxel, in the lanes of `moved`; the others read voxel 0, which is in the cache.
+// The medium and clearance of a voxel, in the lanes of `moved`. The others read voxel 0, which is in the cache.
 static inline Int medium_and_clearance(constant const PhotonTransport *params, global const float *table, Cell c, Mask moved, Int *clearance) {
     Int voxel = select((Int)(0), cell_voxel(params, c), moved);
     Int word = gather_words((global const uchar *)(table + params->at_voxels), voxel * (params->label_bytes + 1));
@@ -88,7 +88,7 @@ static inline Int medium_and_clearance(constant const PhotonTransport *params, g
 }
 #endif
 
-// The medium there; voxels and layers that are cells give it by themselves.
+// The medium of a cell or a point. If voxels or layers are the cells, the cell alone gives it.
 static inline Int medium_of(constant const PhotonTransport *params, global const float *table, Cell c, Real3 p) {
 #if MEDIA == MEDIA_LAYERS
     return LAYER_CELLS ? c.z : layer_at(params, table, p.z);
@@ -103,7 +103,7 @@ static inline Int medium_of(constant const PhotonTransport *params, global const
 #endif
 }
 
-// One number of a medium. The table has a number of all media, then the next; up to 16 of them fit in a register.
+// One number of a medium. The table has one number of all media, then the next number; up to 16 of them fit in a register.
 static inline Real medium_number(constant const PhotonTransport *params, global const float *table, Int medium, int number) {
 #if MEDIA == MEDIA_UNIFORM || MEDIA == MEDIA_DENSITY
     return (Real)(table[number * params->media]);
@@ -115,7 +115,7 @@ static inline Real medium_number(constant const PhotonTransport *params, global 
 #endif
 }
 
-// The refractive index there.
+// The refractive index of a medium.
 static inline Real index_of(constant const PhotonTransport *params, global const float *table, Int medium) {
     return params->mismatch ? medium_number(params, table, medium, MEDIUM_INDEX) : (Real)(params->index);
 }
@@ -129,7 +129,7 @@ static inline Medium medium_all(constant const PhotonTransport *params, global c
     return m;
 }
 
-// The extinction there, per mm.
+// The extinction of a medium in a cell, per mm.
 static inline Real extinction_at(constant const PhotonTransport *params, global const float *table, Int medium, Cell c, Real3 p) {
     Real extinction = medium_number(params, table, medium, MEDIUM_EXTINCTION);
 #if MEDIA == MEDIA_DENSITY

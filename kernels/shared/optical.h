@@ -1,5 +1,5 @@
-// The transfer function on the device: a table of colours and opacities by value, and behind it the few polynomials that replace it where it
-// is smooth but for some kinks.
+// The transfer function on the device: a table of colours and opacities by value, and behind it the few polynomials that replace it if it is smooth
+// except for some kinks.
 #ifndef SHARED_OPTICAL_H
 #define SHARED_OPTICAL_H
 
@@ -8,8 +8,8 @@
 
 typedef struct { Real3 colour; Real alpha; } Optical;
 
-// An entry of the table is two words: the opacity's float less its ten lowest bits, which hold the upper bits of blue, its two
-// lowest above (an opacity is at most 1); then 16 bits each of red and green, rotated right by 25 and 9 bits.
+// An entry of the table is two words. The first is the opacity's float without its ten lowest bits, which hold the upper bits of blue; blue's two
+// lowest bits are at the top (an opacity is at most 1). The second is 16 bits each of red and green, rotated right by 25 and 9 bits.
 typedef struct { Int word, red_green; } Entry;
 
 static inline Entry entry_at(global const uchar *table, Int index) {
@@ -29,7 +29,7 @@ static inline Optical optical(Entry e) {
     return o;
 }
 
-// The position of a raw value in units of `unit` in the table: entry i is at i. NaN where the value is.
+// The position in the table of a raw value in units of `unit`: entry i is at i. It is NaN if the value is.
 static inline Real table_position(constant const EmissionAbsorption *params, Real raw, float unit) {
     Real x = mad(raw, (Real)(params->table_scale * unit), (Real)(params->table_offset - 0.5f));
     Real position = clamp(x, (Real)(0.0f), (Real)(TABLE_SIZE - 1));
@@ -39,13 +39,13 @@ static inline Real table_position(constant const EmissionAbsorption *params, Rea
     return position;
 }
 
-// Behind the table of a function that is smooth but for some kinks stand its pieces: their starts, the ends of their empty parts, and their
+// Behind the table of a function that is smooth except for some kinks stand its pieces: their starts, the ends of their empty parts, and their
 // polynomials, a cubic for the opacity and a line for each colour (src/technique/emission_absorption/pieces.rs).
 typedef struct { float start[PIECES], empty[PIECES], opacity[4][PIECES], colour[3][2][PIECES]; } Pieces;
 
 #define PIECES_OF(table) ((global const Pieces *)((table) + 8 * TABLE_SIZE))
 
-// The piece that a position is on; -1 where there are none.
+// The piece of a position; -1 if there are none.
 static inline int piece_at(global const Pieces *t, float position) {
 #if LANES == 16
     return count_lanes(MASK((Real)(position) >= *(global const Real *)t->start)) - 1;
@@ -56,7 +56,7 @@ static inline int piece_at(global const Pieces *t, float position) {
 #endif
 }
 
-// The pieces that a set of samples lies on.
+// The pieces on which a set of samples lies.
 typedef struct { int first, last; bool empty; } Span;
 
 static inline Span span_of(global const uchar *table, float least, float greatest) {
@@ -80,7 +80,7 @@ static inline int form_of(Span s) { return s.first < 0 ? ON_TABLE : s.first == s
     o.colour = real3(mad(PART(t->colour[0][1]), x, PART(t->colour[0][0])), mad(PART(t->colour[1][1]), x, PART(t->colour[1][0])), \
                      mad(PART(t->colour[2][1]), x, PART(t->colour[2][0])));
 
-// The transfer function where all lanes are on one piece.
+// The transfer function if all lanes are on one piece.
 static inline Optical on_piece(global const Pieces *t, int piece, Real position) {
     Optical o;
     #define PART(column) (Real)((column)[piece])
@@ -89,7 +89,7 @@ static inline Optical on_piece(global const Pieces *t, int piece, Real position)
     return o;
 }
 
-// The same where they are on several.
+// The transfer function if the lanes are on several pieces.
 static inline Optical on_pieces(global const Pieces *t, Span s, Real position) {
 #if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_permvarsf512)
     Int piece = (Int)(s.first);

@@ -1,6 +1,6 @@
-// The march all views share. A work-item renders a beam. All rays take their samples on one grid of steps: sample k stands for
-// k h <= t <= (k + 1) h and lies at (k + jitter) h, each pixel with a jitter of its own. So what is empty is skipped for a
-// whole beam by one scalar walk along its middle, and the picture is the one without skipping.
+// The march that all views share. A work-item renders a beam. All rays take their samples on one grid of steps: sample k stands for k h <= t <= (k +
+// 1) h and lies at (k + jitter) h, each pixel with a jitter of its own. So one scalar walk along the beam's middle skips empty cells for the whole
+// beam, and the picture is the same as without skipping.
 #ifndef SHARED_PACKET_H
 #define SHARED_PACKET_H
 
@@ -18,9 +18,9 @@
 
 typedef struct {
     Int column, row;      // in this pass's pixels
-    Mask inside;          // the picture
+    Mask inside;          // true in the picture
     Real x, y;            // image point in full-size pixels
-    Ray ray;              // t_near > t_far where it misses
+    Ray ray;              // t_near > t_far if it misses
     Real jitter;
     Real3 start, pace;    // sample k is at start + k pace, as inner_raw takes it
     int inner, inner_end; // steps in which every lane takes its whole sample, away from the box's faces by the margin
@@ -29,15 +29,15 @@ typedef struct {
 #endif
 #ifdef NARROW
     float4 low, low_pace; // no lane's sample k is below low + k low_pace, in voxels from the middle of voxel 0
-    int narrow_end;       // before it the lanes' samples of a step are within NARROW voxels of each other
+    int narrow_end;       // in earlier steps the lanes' samples are within NARROW voxels of each other
 #endif
 } Packet;
 
 typedef struct {
     float origin[3], direction[3]; // middle of the samples of step k: origin + direction (k h), index units
     float half_width[3];           // no sample of any lane is further from it
-    float steps[3];                // that it takes for a voxel along the axis
-    int begin, end;                // steps in which any lane has a sample
+    float steps[3];                // steps per voxel along the axis
+    int begin, end;                // the steps in which any lane has a sample
 } Beam;
 
 #ifdef NARROW
@@ -101,13 +101,13 @@ static inline Beam beam_at(constant const View *view, int number, float margin, 
     Beam b;
     b.begin = b.end = 0;
     if (!(far > near)) return b;
-    // Steps are counted in an int. Nobody waits for so many.
+    // Steps are counted in an int. Nobody waits for more.
     b.begin = (int)floor(clamp(near / view->step, -1e9f, 1e9f));
     b.end = (int)ceil(clamp(far / view->step, -1e9f, 1e9f));
     RealLanes v;
     Real farthest;
     #define MIDDLE(to, first, last) v.v = 0.5f * (first + last); to = 0.5f * (v.lane[0] + v.lane[LANES - 1])
-    // A sample lies anywhere in its step; the middle of the step stands for it.
+    // A sample lies anywhere in its step. The middle of the step stands for it.
     #define AXIS(i, c)                                                                                                     \
         MIDDLE(b.direction[i], packets[0].ray.direction.c, packets[PACKETS - 1].ray.direction.c);                          \
         MIDDLE(b.origin[i], packets[0].ray.origin.c, packets[PACKETS - 1].ray.origin.c);                                   \
@@ -130,7 +130,7 @@ static inline Beam beam_at(constant const View *view, int number, float margin, 
 // Three numbers as a vector; the fourth is the third again.
 #define FLOATS(v) (float4)((v)[0], (v)[1], (v)[2], (v)[2])
 
-// The steps from k on in which no lane's sample is in an occupied cell; 0 where the next may be.
+// The number of steps from k on in which no lane's sample is in an occupied cell; 0 if the next one may be.
 static inline int beam_leap(constant const View *view, const Beam *b, global const uchar *distances, int k) {
     float at = (float)k * view->step;
     float4 here = FLOATS(b->origin) + FLOATS(b->direction) * at;
@@ -142,7 +142,7 @@ static inline int beam_leap(constant const View *view, const Beam *b, global con
     distance -= 1;
 #endif
     if (distance <= 0) return 0;
-    // The block of empty cells; beyond the box there is nothing either.
+    // The block of empty cells. Beyond the box all is empty too.
     int4 first = cell - distance + 1, last = cell + distance;
     float4 low = select(convert_float4(first * CELL), (float4)(-1e8f), first <= 0);
     float4 high = select(convert_float4(last * CELL), (float4)(1e8f), last >= count);
@@ -155,15 +155,15 @@ static inline int beam_leap(constant const View *view, const Beam *b, global con
 // The raw value at the sample of a step that is whole in every lane: inner <= k < inner_end.
 static inline __attribute__((always_inline)) Real whole_step_raw(constant const View *view, VOLUME voxels, const Packet *p, int k) {
     Real3 position = along(p->start, p->pace, (Real)((float)k));
-    // A block for one step pays where a register holds it.
+    // A block for one step pays off if a register holds it.
 #if defined(NARROW) && LANES == 16 && VOXEL == VOXEL_U8
     if (k < p->narrow_end) return narrow_raw(view, voxels, position, p->low + p->low_pace * (float)k) * INNER_UNIT;
 #endif
     return inner_raw(view, voxels, position) * INNER_UNIT;
 }
 
-// The raw values in units of INNER_UNIT at the samples of the steps from k to end - 1, at most STRIDE, which are whole in every
-// lane: inner <= k, end <= inner_end.
+// The raw values in units of INNER_UNIT at the samples of the steps from k to end - 1, at most STRIDE, which are whole in every lane: inner <= k, end
+// <= inner_end.
 static inline void whole_steps_raw(constant const View *view, VOLUME voxels, const Packet *p, int k, int end, Real *raw) {
     int i = 0;
 #ifdef NARROW
@@ -186,7 +186,7 @@ static inline void whole_steps_raw(constant const View *view, VOLUME voxels, con
     for (; i < end - k; i++) raw[i] = inner_raw(view, voxels, along(p->start, p->pace, (Real)((float)(k + i))));
 }
 
-// The part of step k that is inside the lane's ray: where its sample lies and for how long it stands, both in t.
+// The part of step k that is inside the lane's ray: the place of its sample and its length, both in t.
 static inline Mask edge_sample(constant const View *view, const Packet *p, int k, Real *t, Real *length) {
     Real from = fmax((Real)((float)k * view->step), p->ray.t_near), to = fmin((Real)((float)(k + 1) * view->step), p->ray.t_far);
     *length = to - from;

@@ -30,7 +30,7 @@ static inline void leave(constant const PhotonTransport *params, global const fl
     tally(ledger, LEDGER_LENGTH + (side * params->radius_bins + ring) * params->angle_bins + cone, photon->weight, binned);
 }
 
-// Takes photons over a boundary across one axis, or back from it. Returns those that left the box.
+// Takes photons over a boundary across one axis, or turns them back there. Returns those that left the box.
 static inline Mask cross_on_axis(constant const FieldPass *pass, constant const PhotonTransport *params, global const float *table,
                               global ulong *ledger, Gains *gains, int axis, Real boundary, Mask in, Photon *photon) {
     Real d = axis == 0 ? photon->d.x : axis == 1 ? photon->d.y : photon->d.z;
@@ -101,7 +101,7 @@ static inline Ahead boundaries_ahead(constant const PhotonTransport *params, glo
     return a;
 }
 
-// Takes photons over a boundary across one axis, if there are more cells behind it and no light is bent. Returns those that it leaves to
+// Takes photons over a boundary across one axis, if there are more cells behind it and no light is bent. Returns those that are left to
 // cross_on_axis.
 static inline Mask cross_inner(constant const PhotonTransport *params, int axis, Real boundary, Mask up, Mask in, Real *p, Int *cell) {
     if (params->mismatch) return in;

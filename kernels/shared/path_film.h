@@ -1,4 +1,4 @@
-// Paths that have ended come to the film: bright samples are clamped where that is asked for, fireflies are counted.
+// The end of paths on the film: bright samples are clamped if the request asks for it, and fireflies are counted.
 #ifndef SHARED_PATH_FILM_H
 #define SHARED_PATH_FILM_H
 
@@ -12,7 +12,7 @@ static inline int firefly(global const float *film, int pixel, int samples, floa
     return mean > 0.0f && luminance(colour) > 2.0f * (float)samples * mean;
 }
 
-// The film's part of the paths in `done`: the next sample of their pixels.
+// Adds the paths in `done` to the film: the next sample of their pixels.
 static inline void finish(constant const View *view, constant const Scattering *params, global float *film, global uint *counts, uint sample,
                           Int at, Mask done, Real3 light, Real alpha) {
     RealLanes red, green, blue, opacity;

@@ -1,8 +1,8 @@
-// Phase functions: how a collision turns a direction. A medium is eight numbers in the table:
+// Phase functions: the distribution of directions after a collision. A medium is eight numbers in the table:
 //   extinction per mm, albedo, refractive index, kind, then two or three parameters of the kind
 //   PHASE_LOBES      g1, g2, weight of g1: two Henyey-Greenstein lobes (one: weight 1; isotropic: g1 = 0)
 //   PHASE_RAYLEIGH   none
-//   PHASE_TABLE      where its rows start in the table, their number: rows (cosine, density, cumulative), linear between them
+//   PHASE_TABLE      the start of its rows in the table, their number: rows (cosine, density, cumulative), linear between them
 #ifndef SHARED_PHASE_H
 #define SHARED_PHASE_H
 
@@ -36,23 +36,23 @@ static inline Real3 rotate_direction(Real3 d, Real one_minus, Real one_plus, Rea
     return scale3(r, mad((Real)(-0.5f), dot3(r, r), (Real)(1.5f)));
 }
 
-// Henyey & Greenstein, Astrophysical Journal 93 (1941), by inversion: with D = 1 - g + 2 g u,
-//   1 - mu = 2 (1 - g)^2 (1 - u) (1 + g u) / D^2,  1 + mu = 2 (1 + g)^2 u (1 - g (1 - u)) / D^2,
-// which loses no digits for g = 0, g near 1 or -1, or angles near 0.
+// Inversion of Henyey & Greenstein, Astrophysical Journal 93 (1941): with D = 1 - g + 2 g u,
+//   1 - mu = 2 (1 - g)^2 (1 - u) (1 + g u) / D^2,  1 + mu = 2 (1 + g)^2 u (1 - g (1 - u)) / D^2.
+// These lose no digits for g = 0, g near 1 or -1, or angles near 0.
 static inline void sample_lobe(Real g, Real u, Real *one_minus, Real *one_plus) {
     Real v = 1.0f - u, inverse = reciprocal(mad(2.0f * g, u, 1.0f - g)), twice = 2.0f * inverse * inverse;
     *one_minus = twice * ((1.0f - g) * (1.0f - g)) * (v * mad(g, u, (Real)(1.0f)));
     *one_plus = twice * ((1.0f + g) * (1.0f + g)) * (u * mad(-g, v, (Real)(1.0f)));
 }
 
-// With 1 + g^2 - 2 g mu = (1 - |g|)^2 + 2 |g| (1 -+ mu), which loses no digits near the peak.
+// The form 1 + g^2 - 2 g mu = (1 - |g|)^2 + 2 |g| (1 -+ mu) loses no digits near the peak.
 static inline Real lobe_density(Real g, Real one_minus) {
     Real size = fabs(g), off = select(one_minus, 2.0f - one_minus, MASK(g < 0.0f));
     Real base = fmax(mad(2.0f * size, off, (1.0f - size) * (1.0f - size)), (Real)(1e-20f)), root = sqrt(base);
     return (1.0f - g * g) / (base * root) * 0.0795774715f;
 }
 
-// Rayleigh, p = 3 (1 + mu^2) / (16 pi): mu = A - 1 / A, A^3 = q + sqrt(q^2 + 1), q = 4 u - 2 (Frisvad, JOSA A 28(12), 2011).
+// Rayleigh's phase function, p = 3 (1 + mu^2) / (16 pi): mu = A - 1 / A, A^3 = q + sqrt(q^2 + 1), q = 4 u - 2 (Frisvad, JOSA A 28(12), 2011).
 static inline Real sample_rayleigh(Real u) {
     Real q = mad((Real)(4.0f), u, (Real)(-2.0f)), size = fabs(q);
     Real a = exp2(log2(size + sqrt(mad(size, size, (Real)(1.0f)))) * 0.333333333f);
@@ -72,8 +72,8 @@ static inline Int table_row(global const float *table, Int first, Int rows, int 
     return low;
 }
 
-// A density that is linear between its rows: its integral is quadratic, so a share x of a row's probability lies where
-// p0 t + (p1 - p0) t^2 / 2 = x (p0 + p1) / 2.
+// Samples a density that is linear between its rows. Its integral is quadratic, so a share x of a row's probability lies at p0 t + (p1 - p0) t^2 / 2
+// = x (p0 + p1) / 2.
 static inline Real sample_table(global const float *table, Int first, Int rows, Real u) {
     Int at = first + table_row(table, first, rows, 2, u) * 3;
     Real mu = gather_reals(table, at), p0 = gather_reals(table + 1, at), start = gather_reals(table + 2, at);
@@ -90,7 +90,7 @@ static inline Real table_density(global const float *table, Int first, Int rows,
     return mad(p1 - p0, (mu - low) / fmax(high - low, (Real)(1e-30f)), p0) * 0.159154943f;
 }
 
-// 1 - cosine and 1 + cosine of a collision's angle, by the number u.
+// Samples 1 - cosine and 1 + cosine of a collision's angle by the number u.
 static inline void sample_phase(global const float *table, const Medium *m, Real u, Real *one_minus, Real *one_plus) {
     Real g = m->a, share = u;
     if (any_lane(MASK(m->c < 1.0f))) {
@@ -111,13 +111,13 @@ static inline void sample_phase(global const float *table, const Medium *m, Real
     *one_plus = select(*one_plus, 1.0f + mu, rayleigh | tabulated);
 }
 
-// 1 - the cosine between two directions: |a - b|^2 / 2, which keeps its digits where they are nearly the same.
+// The difference 1 - cosine of two directions: |a - b|^2 / 2, which keeps its digits if they are nearly the same.
 static inline Real one_minus_cosine(Real3 a, Real3 b) {
     Real3 off = real3(a.x - b.x, a.y - b.y, a.z - b.z);
     return fmin(0.5f * dot3(off, off), (Real)(2.0f));
 }
 
-// The density per steradian of a turn of which 1 - the cosine is that.
+// The density per steradian of a turn with the given 1 - cosine.
 static inline Real phase_density(global const float *table, const Medium *m, Real one_minus) {
     Real mu = 1.0f - one_minus;
     Real density = m->c * lobe_density(m->a, one_minus);

@@ -1,4 +1,4 @@
-// A packet of photons: one a lane. Positions are in mm from the box's corner.
+// A packet of photons, one per lane. Positions are in mm from the box's corner.
 #ifndef SHARED_PHOTON_H
 #define SHARED_PHOTON_H
 
@@ -11,11 +11,11 @@
 #include "shared/tally.h"
 
 typedef struct {
-    Real3 p, d;          // d of unit length
+    Real3 p, d;          // d has unit length
     Cell cell;
     Int medium, clearance;   // of the cell, with HAS_CLEARANCE
     Real weight;
-    Real depth;          // what is left of the free path, in optical depth
+    Real depth;          // the rest of the free path, in optical depth
     Real optical;        // path times refractive index so far
     Real path;
     Real energy;         // of a gamma photon, keV
@@ -34,7 +34,7 @@ static inline Photon no_photon(constant const PhotonTransport *params) {
 }
 
 #if HAS_CLEARANCE
-// Reads the medium and clearance of the cells that photons have come to.
+// Reads the medium and clearance of the cells that photons have reached.
 static inline void update_clearance(constant const PhotonTransport *params, global const float *table, Mask moved, Photon *photon) {
     Int clearance, medium = medium_and_clearance(params, table, photon->cell, moved, &clearance);
     photon->medium = select(photon->medium, medium, moved), photon->clearance = select(photon->clearance, clearance, moved);
@@ -54,10 +54,10 @@ static inline UInt4Lanes draw(constant const FieldPass *pass, const Photon *phot
     return philox(counter(pass, photon, what), pass->seed[0], pass->seed[1]);
 }
 
-// The numbers of an event and of the one after it, and whose they are.
+// The numbers of an event and of the one after it, with the photons and events that they belong to.
 typedef struct { UInt4Lanes first, second; UInt number, event; } Draws;
 
-// Four numbers of the next event of the photons in `alive`, which may be known already.
+// Four numbers of the next event of the photons in `alive`, possibly drawn ahead.
 static inline UInt4Lanes draw_ahead(constant const FieldPass *pass, const Photon *photon, Mask alive, Draws *draws) {
     if (LANES == 1) return draw(pass, photon, 0);
     UInt ahead = photon->event - draws->event;
@@ -123,7 +123,7 @@ static inline void launch(constant const FieldPass *pass, constant const PhotonT
     }
 }
 
-// Takes a photon from where it was launched to the box, where it is bent and in part reflected. What misses the box is `missed`.
+// Takes a photon from its start to the box, where it is refracted and partly reflected. Photons that miss the box are `missed`.
 static inline void enter(constant const PhotonTransport *params, global const float *table, Mask fresh, Photon *photon, Gains *gains,
                          Mask *missed) {
     Real near = (Real)(-1e30f), far = (Real)(1e30f);

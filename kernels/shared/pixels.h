@@ -30,7 +30,7 @@ static inline Real3 load_pixels(global const float *film, int pixel, Real *alpha
 
 static inline Real luminances(Real3 c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
 
-// One number a pixel.
+// One number per pixel.
 static inline Real load_reals(global const float *from, int pixel) {
 #if LANES == 1
     return from[pixel];
@@ -39,10 +39,10 @@ static inline Real load_reals(global const float *from, int pixel) {
 #endif
 }
 
-// The finite ones; an m2 is never negative.
+// The lanes with a finite m2, which is never negative.
 static inline Mask known(Real m2) { return MASK(m2 <= FLT_MAX); }
 
-// sRGB of linear values, by a table of 2^16 steps from 0 to 1 (`curve` of src/device/encode.rs); no number is 0.
+// sRGB of linear values, by a table of 2^16 steps from 0 to 1 (`curve` of src/device/encode.rs); 0 for NaN.
 static inline Int srgb(global const uchar *curve, Real v) {
 #pragma OPENCL FP_CONTRACT OFF
     v = v > 0.0f ? v : (Real)(0.0f);
@@ -67,7 +67,7 @@ static inline void store_bytes(constant Encode *d, global uchar *picture, int at
     lanes.v = bytes;
 #if LANES > 1
     if (!d->transparent && inside >= LANES) {
-        // Of four pixels three words: a store of four, whose last the next four's takes over.
+        // Four pixels are three words. Each store writes four words, and the next pixels overwrite the last one.
         global uchar *to = picture + 3 * at;
         for (int i = 0; i < LANES / 4; i++, to += 12) {
             uchar16 v = lanes.four[i], three = __builtin_shufflevector(v, v, 0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13, 14, -1, -1, -1, -1);
@@ -91,8 +91,8 @@ static inline void store_bytes(constant Encode *d, global uchar *picture, int at
     }
 }
 
-// The bytes of pixels: three each over the background, or four with an alpha that is not multiplied into them. Adds to `clipped` how many
-// values of `lanes` were.
+// The bytes of pixels: three each over the background, or four with an alpha that is not multiplied into them. Adds the number of clipped values of
+// `lanes` to `clipped`.
 static inline Int picture_bytes(constant Encode *d, global const uchar *curve, Real3 colour, Real alpha, Mask lanes, int *clipped) {
 #pragma OPENCL FP_CONTRACT OFF
     Int last = (Int)(0);

@@ -11,8 +11,8 @@
 #include "shared/volume.h"
 
 #if PREINTEGRATED
-// The table: at each entry the integrals from the first of sigma, sigma r, sigma g, sigma b, then their integrands, which
-// beyond the table stay what they are at its ends.
+// The table: at each entry the integrals from the first entry of sigma, sigma r, sigma g, sigma b, then their integrands. Beyond the table the
+// integrands keep their values at its ends.
 static inline Real integral(global const uchar *table, int which, Real x) {
     Real within = clamp(x, (Real)(0.0f), (Real)(TABLE_SIZE - 1));
     Int i = min(to_int(within), (Int)(TABLE_SIZE - 2));
@@ -24,10 +24,9 @@ static inline Real integral(global const uchar *table, int which, Real x) {
     return mad(x - within, gather_reals(column + 4, to_int(within) << 3), sum);
 }
 
-// Between two values taken at the ends of a step the value is taken to be linear: the mean of a quantity over them is the
-// difference of its integrals over the difference of the values (Engel, Kraus, Ertl, "High-Quality Pre-Integrated Volume
-// Rendering Using Hardware-Accelerated Pixel Shading", 2001), so the error falls with the square of the step. Values close
-// together take the integrand in their middle.
+// Between the two ends of a step the value is taken to be linear. The mean of a quantity over them is the difference of its integrals over the
+// difference of the values (Engel, Kraus, Ertl, "High-Quality Pre-Integrated Volume Rendering Using Hardware-Accelerated Pixel Shading", 2001), so
+// the error falls with the square of the step. Values close together take the integrand in their middle.
 static inline Real between(global const uchar *table, int which, Real a, Real b, Mask close) {
     Real position = clamp(0.5f * (a + b) + 0.5f, (Real)(0.0f), (Real)(TABLE_SIZE - 1));
     Real middle = gather_reals((global const float *)table + 4 + which, to_int(position) << 3);
@@ -36,7 +35,7 @@ static inline Real between(global const uchar *table, int which, Real a, Real b,
     return select(mean, middle, close);
 }
 
-// The position of the value at t in the table, neither rounded nor clamped; NaN where the value is.
+// The position of the value at t in the table, neither rounded nor clamped; NaN if the value is.
 static inline Real table_position_at(constant const View *view, constant const EmissionAbsorption *params, VOLUME voxels, const Packet *p,
                             Real t) {
     Real raw = sample_raw(view, voxels, along(p->ray.origin, p->ray.direction, t));

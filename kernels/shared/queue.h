@@ -4,17 +4,17 @@
 
 #include "shared/lanes.h"
 
-// The photons that a work-item has still to launch.
+// The photons that a work-item still has to launch.
 typedef struct {
     uint next, end; // the rest of its share
     bool more;      // true while another share may be taken
     long launched, passed; // photons so far, and steps of all lanes
 } Queue;
 
-// The end of the share that begins with that photon.
+// The end of the share that begins with photon `first`.
 static inline uint share_end(constant const FieldPass *pass, uint first) { return first + min(pass->count - first, pass->per_item); }
 
-// A work-item has one share; with a grid of its own it takes one after the other until there are none.
+// A work-item has one share; with a grid of its own it takes one share after the other until there are none.
 static inline Queue queue_of(constant const FieldPass *pass, uint item) {
     Queue q;
     q.next = pass->own_grids ? 0 : item * pass->per_item;
@@ -30,9 +30,9 @@ static inline void take_share(constant const FieldPass *pass, global ulong *ledg
     q->more = q->next < q->end;
 }
 
-// True if photons are to be launched into so many free lanes. A launch costs about a step of all lanes: if each fills f of them, and
-// photons live n steps, then LANES / (n f) of the time goes into launches and (f - 1) / (2 LANES) is lost to free lanes, the least
-// together where f^2 is 2 LANES^2 / n. So far n is LANES times the steps that have passed over the photons launched.
+// True if photons are to be launched into `free` lanes. A launch costs about a step of all lanes. If each launch fills f lanes, and photons live n
+// steps, then launches take LANES / (n f) of the time and free lanes lose (f - 1) / (2 LANES). Their sum is least if f^2 is 2 LANES^2 / n. So far n
+// is LANES times the steps that have passed over the photons launched.
 static inline int is_launch_due(int free, const Queue *q) {
     return free == LANES || free * free * q->passed >= 2 * LANES * q->launched;
 }

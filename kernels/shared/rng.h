@@ -1,6 +1,5 @@
-// Counter-based random numbers: Philox4x32-10 (Salmon, Moraes, Dror, Shaw: "Parallel Random Numbers: As Easy as
-// 1, 2, 3", SC'11). A number is a pure function of (seed; index, sample, dimension), so a result does not depend on
-// the number of threads, the slices or the load.
+// Counter-based random numbers: Philox4x32-10 (Salmon, Moraes, Dror, Shaw: "Parallel Random Numbers: As Easy as 1, 2, 3", SC'11). A number is a pure
+// function of (seed; index, sample, dimension), so a result does not depend on the number of threads, the slices or the load.
 #ifndef SHARED_RNG_H
 #define SHARED_RNG_H
 
@@ -12,12 +11,12 @@ typedef struct { UInt a, b, c, d; } UInt4Lanes;
 #if LANES == 1
 static inline UInt high_product(UInt x, uint m) { return (uint)(((ulong)x * m) >> 32); }
 #elif LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_convertvector)
-// AVX-512 widens and narrows lanes by an instruction; within a function no vector is too wide.
+// AVX-512 widens and narrows lanes by one instruction; within a function no vector is too wide.
 static inline UInt high_product(UInt x, uint m) {
     return __builtin_convertvector((__builtin_convertvector(x, ulong16) * (ulong)m) >> 32, UInt);
 }
 #else
-// Elsewhere lanes in pairs are taken for 64-bit numbers: the product of the even one of each, then of the odd one (pmuludq).
+// Elsewhere pairs of lanes are taken as 64-bit numbers: the product of the even lane of each, then of the odd one (pmuludq).
 static inline UInt high_product(UInt x, uint m) {
     HalfULong pairs = as_half_ulong(x), even = (pairs & 0xffffffffUL) * (ulong)m, odd = (pairs >> 32) * (ulong)m;
     return as_UInt((even >> 32) | (odd & 0xffffffff00000000UL));
@@ -40,7 +39,7 @@ static inline UInt4Lanes philox(UInt4Lanes ctr, uint key0, uint key1) {
     return ctr;
 }
 
-// The numbers of two counters, for little more than those of one: a round waits for the one before it.
+// The numbers of two counters, for little more time than one: a round waits for the round before it.
 static inline void philox_two(UInt4Lanes *a, UInt4Lanes *b, uint key0, uint key1) {
     for (uint round = 0; round < PHILOX_ROUNDS; round++) {
         *a = philox_round(*a, PHILOX_KEYS(round));
@@ -48,7 +47,7 @@ static inline void philox_two(UInt4Lanes *a, UInt4Lanes *b, uint key0, uint key1
     }
 }
 
-// Strictly inside (0, 1): 23 bits and a half, so that neither log(u) nor log(1 - u) is ever infinite.
+// A number strictly inside (0, 1): 23 bits and a half, so that neither log(u) nor log(1 - u) is ever infinite.
 static inline Real unit_open(UInt bits) { return mad(to_real(bits >> 9), 1.1920928955078125e-7f, 5.9604644775390625e-8f); }
 
 // A free path in optical depth, -ln(u), to 1e-7 of it: u = m 2^e with m from sqrt(1/2) to sqrt(2), and

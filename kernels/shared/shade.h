@@ -13,7 +13,8 @@ static inline Real3 gradient_world(constant const View *view, Real3 g) {
                  mad(m[6], g.x, mad(m[7], g.y, m[8] * g.z)));
 }
 
-// Constants along a ray of unit direction `ray`: for each light the unit half vector, as a covector in index units, whose product with a gradient in index units is that of the vectors in the world.
+// Constants along a ray of unit direction `ray`: for each light the unit half vector, as a covector in index units. Its product with a gradient in
+// index units is that of the vectors in the world.
 static inline void half_ways(constant const View *view, Real3 ray, Real3 half_way[MAX_LIGHTS]) {
     constant const float *m = view->world_gradient_from_index;
     for (int i = 0; i < view->lights; i++) {
@@ -25,15 +26,14 @@ static inline void half_ways(constant const View *view, Real3 ray, Real3 half_wa
     }
 }
 
-// The square of the magnitude in the world of a gradient in index units.
+// The squared magnitude in the world of a gradient in index units.
 static inline Real gradient_squared(constant const View *view, Real3 g) {
     if (view->isotropic_squared > 0.0f) return dot3(g, g) * view->isotropic_squared;
     Real3 n = gradient_world(view, g);
     return dot3(n, n);
 }
 
-// `colour` as lit on the gradient g, in `unit` a voxel. Where the field is flat there is no surface to turn towards the light: full
-// diffuse, no highlight.
+// `colour` lit on the gradient g, in `unit` per voxel. A flat field has no surface to turn towards the light: full diffuse, no highlight.
 static inline Real3 shade(constant const View *view, Real3 g, float unit, const Real3 half_way[MAX_LIGHTS], Real3 colour) {
     Real squared = gradient_squared(view, g);
     Mask flat = MASK(!(squared > view->flat_squared * (1.0f / (unit * unit))));

@@ -1,5 +1,5 @@
-// Styles of samples beyond the transfer function: opacity by gradient and by angle, colour by curvature, light by tone
-// and through thin tissue. All of it is per sample, so it holds for any interpolation.
+// Styles of samples beyond the transfer function: opacity by gradient and by angle, colour by curvature, light by tone and through thin tissue. All
+// of them work per sample, so they hold for any interpolation.
 #ifndef SHARED_STYLE_H
 #define SHARED_STYLE_H
 
@@ -33,8 +33,8 @@ static inline Surface surface_at(constant const View *view, constant const Emiss
     return s;
 }
 
-// The factor of the transfer function's extinction: by |gradient| over the reference (Levoy, IEEE CG&A 8(3),
-// 1988), and at silhouettes by base + gain (1 - |n . v|)^exponent (Ebert & Rheingans, IEEE Visualization 2000).
+// The factor of the transfer function's extinction: by |gradient| over the reference (Levoy, IEEE CG&A 8(3), 1988), and at silhouettes by base + gain
+// (1 - |n . v|)^exponent (Ebert & Rheingans, IEEE Visualization 2000).
 static inline Real extinction_factor(constant const EmissionAbsorption *params, const Surface *s) {
     Real factor = (Real)(1.0f);
     if (params->gradient_gain > 0.0f) factor = s->magnitude * params->gradient_gain;
@@ -77,8 +77,8 @@ static inline Real3 tone(constant const View *view, constant const EmissionAbsor
                  mad(f, warm[2] + 0.5f * colour.z, (1.0f - f) * (cool[2] + 0.25f * colour.z)));
 }
 
-// Light as it falls on a thin sheet that lets the part t through: a light on the eye's side counts (1 - t), one behind t, and
-// its lobe is Blinn's for the light mirrored to the eye's side: h = normalise(l - 2 (n.l) n + v), (n.h)^exponent.
+// Light on a thin sheet that transmits the part t: a light on the eye's side counts (1 - t), a light behind t. The lobe of the latter is Blinn's for
+// the light mirrored to the eye's side: h = normalise(l - 2 (n.l) n + v), (n.h)^exponent.
 static inline Real3 shade_translucent(constant const View *view, constant const EmissionAbsorption *params, const Surface *s, Real3 colour) {
     Real3 n = s->normal, body = real3(view->ambient, view->ambient, view->ambient), shine = real3(0.0f, 0.0f, 0.0f);
     Mask towards = MASK(dot3(n, s->ray) > 0.0f);

@@ -1,4 +1,4 @@
-// The volume's faces, where its refractive index differs from the outside's. Radiance over the squared index is what goes through.
+// The volume's faces, at which the refractive index changes. The transmitted quantity is radiance over the squared index.
 #ifndef SHARED_SURFACE_H
 #define SHARED_SURFACE_H
 
@@ -15,7 +15,7 @@ static inline Real3 face_normal(constant const View *view, Int axis) {
     return scale3(n, rsqrt(dot3(n, n)));
 }
 
-// The lanes that a face turns back by the number u; the others' directions are refracted. eta is the index before over the one behind.
+// The lanes that a face turns back by the number u. The others' directions are refracted. eta is the index before over the one behind.
 static inline Mask cross_face(constant const View *view, float eta, Int axis, Real u, Mask on, Real3 *d) {
     Real3 n = face_normal(view, axis);
     Real along_n = dot3(*d, n), cos_out, reflected = fresnel(fabs(along_n), (Real)(eta), &cos_out);

@@ -16,8 +16,8 @@ static inline void tally_fixed(global ulong *sums, Int cell, ULong amount, Mask 
 
 static inline void tally(global ulong *sums, Int cell, Real amount, Mask active) { tally_fixed(sums, cell, fixed(amount), active); }
 
-// The ledger's entries are LEDGER_…; behind LEDGER_LENGTH of them is the histogram of exits: -z by radius and angle, then +z.
-// Each work-item sums the first of them locally and adds its sums once: otherwise all cores would wait for the same addresses.
+// The ledger's entries are LEDGER_…; behind LEDGER_LENGTH of them is the histogram of exits: -z by radius and angle, then +z. Each work-item sums the
+// first entries locally and adds its sums once: otherwise all cores would wait for the same addresses.
 typedef struct { ULong sums[LEDGER_SCATTERINGS], path; UInt scatterings; } Gains;
 
 static inline Gains no_gains(void) {

@@ -1,7 +1,7 @@
-// Pictures are sampled by tiles of TILE x TILE pixels, one a work-item: a lane whose pixel is done takes the next one of the tile. With one
-// lane a work-item is one of a tile's pixels. `tiles` says which: how many, the number of their next sample, and whether a list
-// follows instead: for each the tile, the number of its next sample, and how many it gets. Behind room for all of them stands what each
-// tile has cost so far, in steps of its packets.
+// Pictures are sampled by tiles of TILE x TILE pixels, one per work-item: a lane whose pixel is done takes the next one of the tile. With one lane a
+// work-item is one of a tile's pixels. `tiles` lists them: their number, the number of their next sample, and if a list follows; the list has for
+// each entry the tile, the number of its next sample, and the number of its samples. Behind the room for all tiles stands the cost of each tile so
+// far, in steps of its packets.
 #ifndef SHARED_TILE_H
 #define SHARED_TILE_H
 
@@ -14,7 +14,7 @@
 #define ITEM TILE
 #define ITEMS 1
 #endif
-// Lanes that are free before more pixels are begun.
+// The number of free lanes at which more pixels are begun.
 #define REFILL (LANES / 8 + 1)
 
 typedef struct { int left, top; uint sample, times, cost_at; } Tile;
@@ -38,7 +38,7 @@ static inline void cost(global uint *tiles, Tile tile, uint steps) {
     if (tile.times > 0u) atomic_add(&tiles[tile.cost_at], steps);
 }
 
-// The offset of a sample in its pixel: `sample_offset` of src/run/sample_offsets.rs, which says why.
+// The offset of a sample in its pixel: `sample_offset` of src/run/sample_offsets.rs, which gives the reason.
 static inline float2 sample_offset(uint sample) {
     if (sample < 4u) {
         float angle = 0.2617994f + 2.0943951f * (float)sample;

@@ -1,9 +1,8 @@
-// Trackers of flights: extinction = density * sigma_t. A free flight ends at a real collision; a ratio flight estimates the transmittance to
-// its end (ratio tracking, Novak, Selle, Jarosz, SIGGRAPH Asia 2014: T = prod (1 - sigma / m) over tentative collisions; in closed form
-// where the extinction is constant within a cell). DENSITY is CONSTANT, where it is the same everywhere, or GRID.
-// Extinctions of three colours are tracked together by that of the greatest: a collision is real with the probability
-// P = sum(w sigma) / (m sum(w)) of the light w that is left, and the colours are weighed by sigma / (m P) or (m - sigma) / (m (1 - P))
-// (Kutz, Habel, Li, Novak, "Spectral and Decomposition Tracking", SIGGRAPH 2017).
+// Trackers of flights: extinction = density * sigma_t. A free flight ends at a real collision; a ratio flight estimates the transmittance to its end
+// (ratio tracking, Novak, Selle, Jarosz, SIGGRAPH Asia 2014: T = prod (1 - sigma / m) over tentative collisions; in closed form if the extinction is
+// constant within a cell). DENSITY is CONSTANT, the same density everywhere, or GRID. Extinctions of three colours are tracked together by the
+// greatest of them: a collision is real with the probability P = sum(w sigma) / (m sum(w)) of the light w that is left, and the colours are weighed
+// by sigma / (m P) or (m - sigma) / (m (1 - P)) (Kutz, Habel, Li, Novak, "Spectral and Decomposition Tracking", SIGGRAPH 2017).
 #ifndef SHARED_TRACKER_H
 #define SHARED_TRACKER_H
 
@@ -13,7 +12,7 @@
 #include "shared/rng.h"
 #include "shared/volume.h"
 
-// Transmittances below this meet the roulette.
+// The transmittance below which flights play the roulette.
 #define FAINT 0.05f
 
 #if DENSITY == DENSITY_CONSTANT
@@ -32,9 +31,9 @@ static inline Real3 box_transmittance(constant const View *view, constant const 
 }
 #endif
 
-// The density of a raw value; what is not a number is empty.
+// The density of a raw value; NaN is empty.
 static inline Real density_of(constant const Scattering *params, Real raw) {
-    // Comparisons, for fmin and fmax take what is not a number for their other argument.
+    // Comparisons are used, since fmin and fmax take a NaN for their other argument.
     Real density = mad(raw, (Real)(params->density_scale), (Real)(params->density_offset));
     density = select(density, (Real)(params->density_most), MASK(density > params->density_most));
     return select((Real)(0.0f), density, MASK(density > 0.0f));
@@ -68,13 +67,13 @@ static inline Real rate_at(constant const View *view, constant const Scattering 
 #endif
 }
 
-// Classifies tentative collisions of colours with extinctions of their own, the greatest `sigma`. Returns the real ones.
+// Classifies tentative collisions if colours have different extinctions, the greatest being `sigma`. Returns the real ones.
 static inline Mask classify_by_colour(constant const Scattering *params, Real sigma, Real rate, Real u, Mask hit, Flight *f) {
     Mask free = hit & ~f->ratio;
     Real3 s = real3(sigma * params->colour[0], sigma * params->colour[1], sigma * params->colour[2]), w = f->throughput;
     Real3 through = real3(1.0f - s.x / rate, 1.0f - s.y / rate, 1.0f - s.z / rate);
     Real sum = fabs(w.x) + fabs(w.y) + fabs(w.z), mean = mad(fabs(w.x), s.x, mad(fabs(w.y), s.y, fabs(w.z) * s.z)) / fmax(sum, (Real)(1e-30f));
-    // If the majorant is too small, the chance of a real collision stays below 1.
+    // The chance of a real collision stays below 1, even if the majorant is too small.
     Real chance = fmin(mean / rate, select((Real)(1.0f), (Real)(0.5f), MASK(sigma > rate)));
     Mask real = free & MASK(u < chance);
     Real if_real = 1.0f / (rate * chance), if_null = 1.0f / (1.0f - chance);
@@ -88,7 +87,7 @@ static inline Mask classify_by_colour(constant const Scattering *params, Real si
     return real;
 }
 
-// Classifies collisions by `rate` where the extinction is `sigma`. Returns the real ones.
+// Classifies collisions of the rate `rate` in an extinction of `sigma`. Returns the real ones.
 static inline Mask classify_collisions(constant const Scattering *params, Real sigma, Real rate, Real u, Mask hit, Flight *f) {
     if (params->chromatic) return classify_by_colour(params, sigma, rate, u, hit, f);
 #if !BY_MAJORANTS
@@ -102,7 +101,7 @@ static inline Mask classify_collisions(constant const Scattering *params, Real s
 #endif
 }
 
-// The boundaries of a flight's cell that are ahead of it, one an axis (DDA), and the lengths to them.
+// The boundaries of a flight's cell that are ahead of it, one per axis (DDA), and the lengths to them.
 typedef struct { Real3 at, length; Real nearest; } Boundaries;
 
 static inline Boundaries boundaries_ahead(constant const View *view, constant const Scattering *params, const Flight *f) {
@@ -119,7 +118,7 @@ static inline Boundaries boundaries_ahead(constant const View *view, constant co
     return b;
 }
 
-// Takes the flights of `crosses` to the next cell. Returns those that leave the volume, by the face across the axis *face.
+// Takes the flights of `crosses` to the next cell. Returns those that leave the volume, through the face across the axis *face.
 static inline Mask cross_boundary(constant const Scattering *params, const Boundaries *b, Mask crosses, Flight *f, Int *face) {
     Mask left = (Mask)(0), in_x = crosses & MASK(b->length.x == b->nearest);
     Mask in_y = crosses & ~in_x & MASK(b->length.y == b->nearest), in_z = crosses & ~in_x & ~in_y;
@@ -147,7 +146,7 @@ static inline void attenuate(constant const Scattering *params, Real depth, Flig
         f->weight *= exp(-depth);
         return;
     }
-    // The weight is that of the colour with the least extinction; the light has what the others lose beyond it.
+    // The weight is that of the colour with the least extinction; the light takes the further losses of the other colours.
     Real3 s = real3(params->colour[0], params->colour[1], params->colour[2]);
     Real least = fmin(s.x, fmin(s.y, s.z));
     f->weight *= exp(-depth * least);
@@ -155,7 +154,7 @@ static inline void attenuate(constant const Scattering *params, Real depth, Flig
 }
 #endif
 
-// The collisions of `hit`, whose numbers are in *r. Returns the real ones; ratio flights that lose the roulette are *over.
+// Handles the collisions of `hit`, whose numbers are in *r. Returns the real ones; ratio flights that lose the roulette are *over.
 static inline Mask collide_at(constant const View *view, constant const Scattering *params, VOLUME voxels, global uint *counts, Real rate,
                               Mask hit, Flight *f, UInt4Lanes *r, Mask *over) {
     *r = draw(view, f, 0);
@@ -180,8 +179,8 @@ static inline Mask collide_at(constant const View *view, constant const Scatteri
 #endif
 }
 
-// One step of every lane that is alive: to a collision, a cell boundary, or the end of its flight. Returns the real collisions of free
-// flights, with numbers for what follows in *r; *over are those that came to their end or left the volume through the face *face (-1: none).
+// Takes one step of every lane that is alive: to a collision, a cell boundary, or the end of its flight. Returns the real collisions of free flights,
+// with numbers for the next event in *r; *over are those that reached their end or left the volume through the face *face (-1: none).
 static inline Mask fly(constant const View *view, constant const Scattering *params, VOLUME voxels, global const uchar *ranges,
                        global uint *counts, Mask alive, Flight *f, UInt4Lanes *r, Mask *over, Int *face) {
     Real rate = rate_at(view, params, voxels, ranges, f);

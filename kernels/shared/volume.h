@@ -1,5 +1,5 @@
-// A volume in its own voxel type, x fastest. Index coordinates are cell-cornered: voxel i has its centre at i + 0.5 and
-// the box is [0, n]; outside the outermost centres the edge value holds. The buffer is padded by 8 zero bytes.
+// A volume in its own voxel type, x fastest. Index coordinates are cell-cornered: voxel i has its centre at i + 0.5 and the box is [0, n]. Outside
+// the outermost centres the edge value holds. The buffer is padded by 8 zero bytes.
 #ifndef SHARED_VOLUME_H
 #define SHARED_VOLUME_H
 
@@ -7,7 +7,7 @@
 #include "shared/lanes.h"
 #include "shared/voxel.h"
 
-// INTERPOLATION says how values lie between voxels.
+// INTERPOLATION selects the interpolation between voxels.
 #ifndef INTERPOLATION
 #error "a kernel that reads volumes is built with an INTERPOLATION"
 #endif
@@ -27,7 +27,7 @@ static inline Real first_voxel(Int word) {
 #endif
 }
 
-// One voxel a lane; the index is clamped to the grid.
+// One voxel per lane; the index is clamped to the grid.
 static inline Real voxel_raw(constant const View *view, VOLUME voxels, Int x, Int y, Int z) {
     x = clamp(x, (Int)(0), (Int)(view->dims[0] - 1));
     y = clamp(y, (Int)(0), (Int)(view->dims[1] - 1));
@@ -39,7 +39,7 @@ static inline Real voxel_raw(constant const View *view, VOLUME voxels, Int x, In
 #endif
 }
 
-// The value of the voxel that p is in.
+// The value of the voxel that contains p.
 static inline Real nearest_raw(constant const View *view, VOLUME voxels, Real3 p) {
     return voxel_raw(view, voxels, to_int(floor(p.x)), to_int(floor(p.y)), to_int(floor(p.z)));
 }
@@ -105,7 +105,7 @@ static inline Real trilinear_raw(constant const View *view, VOLUME voxels, Real3
     return read_imagef(voxels, linear_sampler, (float4)(p.x, p.y, p.z, 0.0f)).x * CHANNEL_SCALE;
 }
 #else
-// Two neighbours in x, one load where their bits fit in a word: loads, not arithmetic, are what a sample costs.
+// Two neighbours in x, by one load if their bits fit in a word: the cost of a sample is its loads, not its arithmetic.
 static inline Real lerp_x(global const uchar *voxels, Int byte_offset, Real f) {
 #if VOXEL == VOXEL_F32
     Int first, second;
@@ -124,7 +124,7 @@ static inline Real lerp_x(global const uchar *voxels, Int byte_offset, Real f) {
     return mad(b - a, f, a);
 }
 
-// The raw value (before slope and intercept) at p, trilinear. A NaN voxel makes the whole of its eight cells NaN.
+// The raw value (before slope and intercept) at p, trilinear. A NaN voxel makes all of its eight cells NaN.
 static inline Real trilinear_raw(constant const View *view, VOLUME voxels, Real3 p) {
     int nx = view->dims[0], ny = view->dims[1], nz = view->dims[2];
     Real x = clamp(p.x - 0.5f, (Real)(0.0f), (Real)(nx - 1));
@@ -141,7 +141,7 @@ static inline Real trilinear_raw(constant const View *view, VOLUME voxels, Real3
 }
 #endif
 
-// The raw value at p by the interpolation that is compiled in.
+// The raw value at p by the compiled-in interpolation.
 static inline Real sample_raw(constant const View *view, VOLUME voxels, Real3 p) {
 #if INTERPOLATION == INTERPOLATION_NEAREST
     return nearest_raw(view, voxels, p);

@@ -1,4 +1,4 @@
-// The type of a voxel: what a volume has on the device is what its file has.
+// The type of a voxel: a volume has the same type on the device as in its file.
 #ifndef SHARED_VOXEL_H
 #define SHARED_VOXEL_H
 

@@ -1,8 +1,7 @@
-// The exact walk: from one plane at which the interpolant changes its polynomial to the next (Amanatides & Woo, Eurographics
-// 1987; Siddon, Medical Physics 12(2), 1985). The planes are the voxels' faces for `nearest`, else the planes of their centres.
-// Between two of them the value along a ray is a polynomial in t, of degree 0 (nearest), 3 (trilinear) or 9 (cubic), and
-// Gauss-Legendre with 1, 2 or 5 points integrates it exactly. Beyond the outermost centres the edge value holds, which is
-// a polynomial too. Stretches that touch a NaN count neither in the integral nor in the length.
+// The exact walk: from one plane at which the interpolant changes its polynomial to the next (Amanatides & Woo, Eurographics 1987; Siddon, Medical
+// Physics 12(2), 1985). The planes are the voxels' faces for `nearest`, else the planes of their centres. Between two of them the value along a ray
+// is a polynomial in t, of degree 0 (nearest), 3 (trilinear) or 9 (cubic), and Gauss-Legendre with 1, 2 or 5 points integrates it exactly. Beyond the
+// outermost centres the edge value holds, which is a polynomial too. Stretches that touch a NaN count neither in the integral nor in the length.
 #ifndef SHARED_WALK_H
 #define SHARED_WALK_H
 
@@ -18,7 +17,7 @@
 typedef struct {
     Real integral; // of the raw value
     Real length;   // of the stretches with a value, world units
-    Real best;     // greatest sign * raw value; -INFINITY where there is none
+    Real best;     // greatest sign * raw value; -INFINITY if there is none
 } Walk;
 
 typedef struct { Real origin, inverse, plane, towards; float last; } Crossing; // the next plane across one axis
@@ -35,7 +34,7 @@ static inline Crossing crossing_from(Real origin, Real direction, Real t, int n)
     return c;
 }
 
-// When the ray is there; never, where there is no further plane.
+// The t of the crossing; infinite without a further plane.
 static inline Real crossing_time(const Crossing *c) {
     Real t = (c->plane - c->origin) * c->inverse;
     return select((Real)(1e30f), t, MASK(c->plane >= 0.0f) & MASK(c->plane <= c->last));
@@ -72,8 +71,8 @@ static inline void pair_raw(global const uchar *voxels, Int at, Real *a, Real *b
 #endif
 }
 
-// The eight voxels around p, and the lowest corner. Beyond the outermost centres both of a pair are the one at the edge, so
-// that a NaN further in has no effect there.
+// The eight voxels around p, and the lowest corner. Beyond the outermost centres both voxels of a pair are the one at the edge, so that a NaN further
+// in has no effect there.
 static inline Corners corners_at(constant const View *view, VOLUME voxels, Real3 p) {
     int nx = view->dims[0], ny = view->dims[1], nz = view->dims[2];
     Corners c;
@@ -103,8 +102,8 @@ static inline Real corners_raw(const Corners *c, Real3 p) {
 
 static inline void keep_greatest(Real *best, Real v) { *best = select(*best, v, MASK(v > *best)); }
 
-// The greatest of sign times the cubic along the stretch: at its ends, or where its derivative is 0. The value is always
-// taken from the interpolant itself, so that a rounding error in a root costs the square of it.
+// The greatest of sign times the cubic along the stretch: at its ends, or at a zero of its derivative. The value is always taken from the interpolant
+// itself, so that a rounding error in a root costs the square of it.
 static inline void stretch_peak(const Corners *c, float sign, Real3 o, Real3 d, Real t, Real length, Mask on, Real *best) {
     Real f[4], peak = *best;
     for (int i = 0; i < 4; i++) {
@@ -126,8 +125,8 @@ static inline void stretch_peak(const Corners *c, float sign, Real3 o, Real3 d, 
 }
 #endif
 
-// One stretch from t on: the mean of the raw value over it, and the greatest of sign times it where `peaks` (exact for nearest
-// and trilinear; for the cubics the greatest of the five points).
+// One stretch from t on: the mean of the raw value over it, and with `peaks` the greatest of sign times it (exact for nearest and trilinear; for the
+// cubics the greatest of the five points).
 static inline Real stretch(constant const View *view, VOLUME voxels, float sign, int peaks, Real3 o, Real3 d, Real t, Real length,
                            Mask on, Real *best) {
     Real middle = mad(length, (Real)(0.5f), t);
@@ -163,7 +162,7 @@ static inline Walk walk(constant const View *view, VOLUME voxels, float sign, in
     Crossing z = crossing_from(o.z, d.z, t_near, view->dims[2]);
     Real t = t_near;
     Mask alive = MASK(t < t_far);
-    // A line crosses each plane once; the bound only guards against what rounding could do.
+    // A line crosses each plane once. The bound only guards against rounding.
     int most = view->dims[0] + view->dims[1] + view->dims[2] + 8;
     for (int i = 0; i < most && any_lane(alive); i++) {
         Real tx = crossing_time(&x), ty = crossing_time(&y), tz = crossing_time(&z);

@@ -6,7 +6,7 @@
 #include "shared/lanes.h"
 #include "shared/packet.h"
 
-// The colour of a value; entry = value scale + offset. What is not a number has the first colour.
+// The colour of a value; entry = value scale + offset. NaN has the first colour.
 static inline Real3 window_colour(global const uchar *table, float scale, float offset, Real value) {
     Real x = mad(value, (Real)(scale), (Real)(offset));
     x = clamp(select((Real)(0.0f), x, MASK(x == x)), (Real)(0.0f), (Real)(WINDOW_SIZE - 1));
@@ -19,7 +19,7 @@ static inline Real3 window_colour(global const uchar *table, float scale, float 
     #undef CHANNEL
 }
 
-// Adds values to the film where there are any: their colours, or themselves.
+// Adds the values of the lanes `shown` to the film: their colours, or the values themselves. The others are transparent.
 static inline void film_value(constant const View *view, global float *film, global uint *counts, const Packet *p, global const uchar *table,
                               float scale, float offset, int raw_values, Real value, Mask shown) {
     Real3 colour = raw_values ? real3(value, value, value) : window_colour(table, scale, offset, value);

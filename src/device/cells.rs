@@ -1,5 +1,4 @@
-//! Macro-cells on the device: the least and greatest value in each block of voxels, and from them the distance to anything
-//! that a view wants to see.
+//! Macro-cells on the device: the least and greatest value in each block of voxels, and from them the distance to the nearest cell that a view needs.
 
 pub use super::numbers::CELL;
 use super::program::{Source, Variant};
@@ -14,11 +13,11 @@ device_struct! {
     pub struct CellsPass {
         /// Voxels along x, y, z.
         pub dims: [i32; 3],
-        /// The axis of a pass of `distances`.
+        /// The axis along which a pass of `distances` works.
         pub axis: i32,
         /// The number of intervals of values that make a cell occupied.
         pub intervals: i32,
-        /// An interpolant may go beyond a cell's range by this part of it.
+        /// The part of a cell's range by which an interpolant may exceed it.
         pub overshoot: f32,
     }
 }
@@ -39,24 +38,24 @@ pub fn sources() -> [Source; 2] {
     ]
 }
 
-/// The variants that a volume of such voxels needs.
+/// The variants that a volume of these voxels needs.
 pub fn needed(voxel: VoxelType) -> [Variant; 2] {
     [variant("cells", voxel), variant("distances", voxel)]
 }
 
 /// The least and greatest voxel that a sample in each cell can read.
 pub struct Cells {
-    /// Two voxels a cell, in the volume's own type; where all are NaN the least is above the greatest.
+    /// Two voxels per cell, in the volume's own type; if all are NaN the least is above the greatest.
     pub ranges: Buffer,
     voxel_dims: [usize; 3],
     voxel: VoxelType,
 }
 
 impl Cells {
-    /// Builds them from the voxels on the device.
+    /// Builds the cells from the voxels on the device.
     ///
     /// # Errors
-    /// [`crate::error::Error::Internal`] when the device has no room or a kernel fails.
+    /// [`crate::error::Error::Internal`] if the device has no room or a kernel fails.
     pub fn new(device: &mut Device, voxels: &Buffer, voxel_dims: [usize; 3], voxel: VoxelType) -> Result<Self> {
         let [build, _] = sources();
         let kernel = variant("cells", voxel);
@@ -74,8 +73,8 @@ impl Cells {
         self.voxel_dims.map(|n| n.div_ceil(CELL))
     }
 
-    /// For each cell, x fastest, the Chebyshev distance in cells to the nearest one whose range meets one of `intervals` (raw
-    /// values), widened by the part `overshoot` of itself: 0 in such a cell itself, 255 for 255 or more. In a cell of distance `d` nothing is within `d − 1` cells.
+    /// For each cell, x fastest, the Chebyshev distance in cells to the nearest one whose range meets one of `intervals` (raw values), widened by the
+    /// part `overshoot` of itself: 0 in such a cell itself, 255 for 255 or more. Around a cell of distance `d` all cells within `d − 1` are empty.
     ///
     /// # Errors
     /// As [`Cells::new`].

@@ -1,5 +1,5 @@
-//! Films are encoded on the device: as the picture in sRGB bytes, and as the sums that its error is made of. The film itself, with 20 bytes
-//! a pixel, stays there until somebody asks for it.
+//! Films are encoded on the device: as the picture in sRGB bytes, and as the sums for its error. The film itself, with 20 bytes per pixel, stays
+//! there until somebody asks for it.
 
 mod sums;
 
@@ -17,7 +17,7 @@ use sums::{ControlSum, FilmSum, SUMS, sums_of_block, sums_of_control};
 
 /// Bytes that lanes may read behind a film's last pixel.
 pub const PADDING: usize = 256;
-/// The same behind a table.
+/// Bytes that lanes may read behind a table.
 const TABLE_PADDING: usize = 8;
 
 device_struct! {
@@ -27,7 +27,7 @@ device_struct! {
         pub width: i32,
         /// Its rows.
         pub height: i32,
-        /// It has every `stride`-th pixel of the picture.
+        /// The film's pixels are every `stride`-th pixel of the picture.
         pub stride: i32,
         /// Size of the picture.
         pub picture_width: i32,
@@ -41,17 +41,17 @@ device_struct! {
         pub ended: f32,
         /// Samples of a pixel.
         pub count: i32,
-        /// Pixels along the side of a tile with samples of its own; 0 where all have as many.
+        /// Pixels along the side of a tile with its own number of samples; 0 if all pixels have as many.
         pub tile: i32,
         /// Tiles across.
         pub tiles_wide: i32,
-        /// 1 if squared deviations are looked at.
+        /// 1 if squared deviations are summed.
         pub deviations: i32,
-        /// Pixels across of the control,
+        /// Pixels across of the control.
         pub control_width: i32,
-        /// down, or 0 where there is none,
+        /// Pixels down of the control; 0 if there is none.
         pub control_height: i32,
-        /// and its stride in the film's pixels.
+        /// The control's stride in the film's pixels.
         pub control_stride: i32,
     }
 }
@@ -74,7 +74,7 @@ pub struct EncodeSettings {
     pub background: Background,
     /// Opacity at which rays end.
     pub opacity_threshold: f64,
-    /// True if squared deviations are looked at: of one sample that was finite everywhere there are none.
+    /// True if squared deviations are summed. A single sample that is finite everywhere has none.
     pub deviations: bool,
 }
 
@@ -98,10 +98,10 @@ fn across(lanes: usize) -> usize {
     if lanes == 1 { 32 } else { 8 * lanes }
 }
 
-/// The curve of sRGB on the device, for all that is encoded there.
+/// The curve of sRGB on the device, for all encoders.
 ///
 /// # Errors
-/// [`crate::error::Error::Internal`] when the device has no room.
+/// [`crate::error::Error::Internal`] if the device has no room.
 pub fn curve(device: &Device) -> Result<Rc<Buffer>> {
     device.upload(srgb::table(), TABLE_PADDING).map(Rc::new)
 }
@@ -117,10 +117,10 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// Room for a picture, in the memory of the one `before` where that is as large; `curve` is [`curve`]'s.
+    /// Allocates memory for a picture, or takes over the memory of the encoder `before` if that is as large; `curve` is the result of [`curve`].
     ///
     /// # Errors
-    /// [`crate::error::Error::Internal`] when the device has none.
+    /// [`crate::error::Error::Internal`] if the device has no room.
     pub fn new(
         device: &mut Device,
         curve: &Rc<Buffer>,
@@ -148,10 +148,10 @@ impl Encoder {
         self.picture.len() + self.sums.len()
     }
 
-    /// Encodes `main` and returns the sums that its error against `control` is made of. Then the picture can be read.
+    /// Encodes `main` and returns the sums for its error against `control`. Then the picture can be read.
     ///
     /// # Errors
-    /// [`crate::error::Error::Internal`] when the device has no room or the kernel fails.
+    /// [`crate::error::Error::Internal`] if the device has no room or the kernel fails.
     pub fn encode(
         &mut self,
         device: &Device,
@@ -194,7 +194,7 @@ impl Encoder {
     /// The picture last encoded: three bytes of sRGB a pixel, or four with an alpha that is not multiplied into them.
     ///
     /// # Errors
-    /// [`crate::error::Error::Internal`] when OpenCL fails.
+    /// [`crate::error::Error::Internal`] if OpenCL fails.
     pub fn picture(&self, device: &Device) -> Result<Vec<u8>> {
         let mut picture = vec![0; self.channels * self.size[0] * self.size[1]];
         device.read(&self.picture, 0, &mut picture)?;

@@ -1,11 +1,11 @@
-//! Choices are numbered once: [`device_enum!`](crate::device_enum) makes the Rust enum and the `#define`s that kernels call its variants by.
-//! Each enum has a prefix of its own, so that a name means one thing in all kernels.
+//! Choices are numbered once: [`device_enum!`](crate::device_enum) makes the Rust enum, and the `#define`s by which kernels name its variants. Each
+//! enum has a prefix of its own, so that a name has one meaning in all kernels.
 
 use std::fmt::Debug;
 
 /// An enum whose variants kernels know by name.
 pub trait DeviceEnum: Copy + Debug + 'static {
-    /// The names of its variants begin with this in OpenCL C.
+    /// The prefix of its variants' names in OpenCL C.
     const PREFIX: &'static str;
     /// The variants in order.
     const ALL: &'static [Self];
@@ -15,7 +15,7 @@ pub trait DeviceEnum: Copy + Debug + 'static {
     /// The number of a variant.
     fn number(self) -> i32;
 
-    /// A `#define` for each variant, such as `#define TRACKING_EXACT 0`, and one for how many there are, such as `TRACKING_LENGTH`.
+    /// A `#define` for each variant, such as `#define TRACKING_EXACT 0`, and one for the number of variants, such as `TRACKING_LENGTH`.
     fn opencl_text() -> String {
         let line = |name: &str, number: i32| format!("#define {}_{name} {number}\n", Self::PREFIX);
         let variants = Self::ALL.iter().map(|v| line(&upper_snake(&format!("{v:?}")), v.number()));
@@ -23,7 +23,7 @@ pub trait DeviceEnum: Copy + Debug + 'static {
     }
 }
 
-/// `BSpline` as `B_SPLINE`: a word begins at a capital after a small letter, and at one before a small letter.
+/// `BSpline` as `B_SPLINE`: a word begins at a capital after a small letter, and at a capital before a small letter.
 fn upper_snake(name: &str) -> String {
     let letters: Vec<char> = name.chars().collect();
     let begins = |i: usize| {
@@ -61,19 +61,19 @@ macro_rules! device_enum {
 }
 
 device_enum! {
-    /// Words of the buffer in which view kernels count what must not be silent.
+    /// Words of the buffer in which view kernels count events that a reply must report.
     pub enum Count: "COUNT" {
         /// Samples that are not finite.
         NonFinite,
-        /// Samples that bring more light than all before them.
+        /// Samples that bring more light than all samples of their pixel before.
         Fireflies,
         /// Samples that were brighter than `clamp_luminance`.
         Clamped,
         /// Collisions at which the majorant was below the extinction.
         Broken,
-        /// Luminance that clamping took away, in units of 2⁻¹⁶ of `clamp_luminance`: the low word of a 64-bit sum, so its number is even.
+        /// Luminance that clamping removed, in units of 2⁻¹⁶ of `clamp_luminance`: the low word of a 64-bit sum, so its number is even.
         ClampedEnergyLow,
-        /// The high word.
+        /// The high word of that sum.
         ClampedEnergyHigh,
         /// Paths that were cut after the most collisions.
         Cut,

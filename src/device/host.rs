@@ -4,28 +4,27 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 
-/// Ends the process without running destructors: PoCL's and LLVM's would destroy what the device's thread may still be compiling with, and
+/// Ends the process without running destructors. PoCL's and LLVM's would destroy objects that the device's thread may still be compiling with, and
 /// the process would crash.
 pub fn leave(code: i32) -> ! {
     use std::io::Write;
-    // A pipe that nobody reads any more cannot be flushed; the process ends all the same.
+    // A pipe without a reader cannot be flushed; the process ends all the same.
     let _ = std::io::stdout().flush();
-    // SAFETY: takes a number and does not return; files are written through, and no lock matters to a process that ends.
+    // SAFETY: the call takes a number and does not return; files are written through, and no lock matters to a process that ends.
     unsafe { libc::_exit(code) }
 }
 
-/// Lets this process give way to others: one that compiles ahead must not hold up one that renders.
+/// Lowers this process's priority: a process that compiles ahead must not delay one that renders.
 pub fn give_way() {
-    // SAFETY: takes numbers only; that it may fail changes nothing but the order of work.
+    // SAFETY: the call takes numbers only; a failure changes nothing but the order of work.
     unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, 5) };
 }
 
-/// Points PoCL's compiled-kernel cache at `cache`, unless the environment names one already, and makes sure that code can be
-/// run from there: PoCL itself would crash later.
-/// Call before any thread is started and before OpenCL is first used.
+/// Sets the folder of PoCL's compiled kernels to `cache`, unless the environment names one already, and checks that code in it can be run: PoCL
+/// itself would crash later. Call it before any thread is started and before OpenCL is first used.
 ///
 /// # Errors
-/// [`Error::Internal`] when the folder cannot be made, or is on a file system mounted `noexec`.
+/// [`Error::Internal`] if the folder cannot be made, or is on a file system mounted `noexec`.
 pub fn keep_compiled_kernels_in(cache: &Path) -> Result<()> {
     let cache = std::env::var_os("POCL_CACHE_DIR").map_or_else(|| cache.to_owned(), PathBuf::from);
     let said = |e: std::io::Error| Error::internal(format!("kernel cache {}: {e}", cache.display()));
@@ -41,7 +40,7 @@ pub fn keep_compiled_kernels_in(cache: &Path) -> Result<()> {
             cache.display()
         )));
     }
-    // SAFETY: called from main before any other thread exists, so nobody reads the environment at the same time.
+    // SAFETY: main calls this before any other thread exists, so nobody reads the environment at the same time.
     unsafe { std::env::set_var("POCL_CACHE_DIR", cache) };
     Ok(())
 }

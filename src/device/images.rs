@@ -40,7 +40,7 @@ pub(super) fn formats(context: &Context) -> Vec<String> {
     formats.iter().map(name).collect()
 }
 
-/// The type that a sampler reads each voxel type as: normalised, so that it filters them.
+/// The type as which a sampler reads each voxel type: a normalised one, so that the sampler filters it.
 fn channel_type(voxel: VoxelType) -> u32 {
     match voxel {
         VoxelType::U8 => m::CL_UNORM_INT8,
@@ -54,7 +54,7 @@ impl Device {
     /// The voxels as a 3D image of one channel in their own type.
     ///
     /// # Errors
-    /// [`crate::error::Error::Internal`] when the device has no room or does not take such an image.
+    /// [`crate::error::Error::Internal`] if the device has no room or does not support such an image.
     pub fn upload_image(&self, voxels: &Voxels, dims: [usize; 3]) -> Result<Buffer> {
         let bytes = voxels.as_bytes();
         let format = cl_image_format {

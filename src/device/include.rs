@@ -1,7 +1,7 @@
-//! Kernel files and their `#include` lines, put together to one text.
+//! Kernel files and their `#include` lines, joined to one text.
 //!
-//! OpenCL's own includes need folders, which a binary with embedded kernels does not have, and opencl3 crashes on programs of several
-//! strings. So a program's text is whole before the compiler sees it. A file is taken where it is first named, and once.
+//! OpenCL's own includes need folders, which a binary with embedded kernels does not have, and opencl3 crashes on programs of several strings. So a
+//! program's text is complete before the compiler reads it. Each file is included once, at its first mention.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ static KERNELS: Dir = include_dir!("$CARGO_MANIFEST_DIR/kernels");
 /// Reads a kernel file from the folder `overrides`, or else from the binary.
 ///
 /// # Errors
-/// [`Error::Internal`] when there is no such file.
+/// [`Error::Internal`] if there is no such file.
 pub(super) fn read(overrides: Option<&Path>, name: &str) -> Result<String> {
     if let Some(folder) = overrides {
         let text = std::fs::read_to_string(folder.join(name));
@@ -24,7 +24,7 @@ pub(super) fn read(overrides: Option<&Path>, name: &str) -> Result<String> {
     file.map(str::to_owned).ok_or_else(|| Error::internal(format!("kernel file {name} is not in the binary")))
 }
 
-/// Puts the file `main` and all that it includes together. `#line` says to the compiler which file each part is of.
+/// Joins the file `main` and all its includes. `#line` tells the compiler the file of each part.
 ///
 /// # Errors
 /// [`Error::Internal`] for an included file that is missing, includes itself, or is included under a condition.
@@ -36,9 +36,9 @@ pub(super) fn assemble(main: &str, read: &dyn Fn(&str) -> Result<String>) -> Res
 
 struct Assembly<'a> {
     read: &'a dyn Fn(&str) -> Result<String>,
-    /// Files that are in the text.
+    /// The files in the text so far.
     taken: Vec<String>,
-    /// The file that is being taken, and before it those that include it.
+    /// The file that is being included, after the files that include it.
     open: Vec<String>,
     text: String,
 }
@@ -52,8 +52,8 @@ impl Assembly<'_> {
         self.taken.push(name.to_owned());
         self.open.push(name.to_owned());
         self.text += &format!("#line 1 \"kernels/{name}\"\n");
-        // The guard of a header is the one condition that may be around an include: any other would hold for the first file that
-        // includes the header, and for all others with it.
+        // The guard of a header is the only condition that may enclose an include. Any other condition would hold for the first file that includes
+        // the header, and so for all others.
         let permitted_depth = usize::from(name.ends_with(".h"));
         let mut depth = 0usize;
         for (line, number) in content.lines().zip(1..) {
@@ -90,7 +90,7 @@ impl Assembly<'_> {
     }
 }
 
-/// The preprocessor directive of a line, and what follows it.
+/// The preprocessor directive of a line, and the rest of the line.
 fn directive(line: &str) -> Option<(&str, &str)> {
     let rest = line.trim_start().strip_prefix('#')?.trim_start();
     Some(rest.split_at(rest.find(|c: char| !c.is_ascii_alphabetic()).unwrap_or(rest.len())))
@@ -145,7 +145,7 @@ mod tests {
         assert!(assembled(&[("a.cl", "#include <c.h>\n"), ("c.h", "")]).is_err(), "not in quotes");
     }
 
-    /// So that no header relies on what another file happens to include before it.
+    /// The rule ensures that no header depends on an include of another file before it.
     #[test]
     fn every_header_has_a_guard_and_every_include_stands_at_the_top() {
         let folders = [Some(&KERNELS), KERNELS.get_dir("shared")];

@@ -1,4 +1,4 @@
-//! Launches: a built kernel, its arguments by name, and how many work-items.
+//! Launches: a built kernel, its arguments by name, and the number of work-items.
 
 use std::ptr;
 use std::time::{Duration, Instant};
@@ -51,11 +51,12 @@ impl Range {
         }
     }
 
-    /// Work-items along three dimensions, those that the range has not being 1, and of a work-group that has `group` of them.
+    /// The numbers of work-items along three dimensions, of the launch and of a work-group of `group` items. Dimensions that the range does not have
+    /// are 1.
     ///
-    /// A range's number of dimensions alone decides the size of its work-groups: PoCL compiles a kernel anew for each size, at its first
-    /// launch, which takes from 60 ms to seconds. On a processor, where groups are small, they are a row in all three cases, so that
-    /// PoCL has a single size to compile for.
+    /// A range's number of dimensions alone decides the size of its work-groups: PoCL compiles a kernel anew for each size, at its first launch,
+    /// which takes from 60 ms to seconds. On a processor, where groups are small, they are a row in all three cases, so that PoCL has a single size
+    /// to compile for.
     fn sizes(self, group: usize) -> ([usize; 3], [usize; 3]) {
         let (items, compact) = match self {
             Self::One(n) => ([n, 1, 1], [GPU_GROUP, 1, 1]),
@@ -81,19 +82,19 @@ impl Device {
     /// The parameters of a built variant.
     ///
     /// # Errors
-    /// [`Error::Internal`] when it is not built.
+    /// [`Error::Internal`] if it is not built.
     pub fn parameters(&self, variant: &Variant) -> Result<&[Parameter]> {
         self.built(variant).map(|built| built.parameters.as_slice())
     }
 
-    /// Runs a built variant over a range of work-items, waits, and returns the time that the device took.
+    /// Runs a built variant over a range of work-items, waits, and returns the device's time.
     ///
     /// `arguments` are the kernel's buffers by the names of its parameters, in any order. The kernel itself keeps within them and returns
     /// at once for items past its work, since the range is rounded up to whole work-groups. There is no global offset: PoCL would compile
     /// the kernel anew for one, at its first launch.
     ///
     /// # Errors
-    /// [`Error::Internal`] when the variant is not built, an argument is unknown, doubled or missing, or OpenCL fails.
+    /// [`Error::Internal`] if the variant is not built, an argument is unknown, doubled or missing, or OpenCL fails.
     pub fn run(&self, variant: &Variant, arguments: &[(&str, &Buffer)], range: impl Into<Range>) -> Result<Duration> {
         let Built { kernel, parameters } = self.built(variant)?;
         let places = signature::places(parameters, arguments.iter().map(|(name, _)| *name))
@@ -103,7 +104,7 @@ impl Device {
                 Memory::Bytes(memory) => memory.get(),
                 Memory::Image(image) => image.get(),
             };
-            // SAFETY: every kernel argument here is a buffer, and a cl_mem of this context is what clSetKernelArg takes for one.
+            // SAFETY: every kernel argument here is a buffer, for which clSetKernelArg takes a cl_mem of this context.
             cl("setting an argument", unsafe { kernel.set_arg(place as u32, &memory) })?;
         }
         let range = range.into();

@@ -1,4 +1,4 @@
-//! The instruction set that the device's compiler makes code for, by its own macros.
+//! The instruction set for which the device's compiler makes code, by the compiler's own macros.
 
 use super::Device;
 use super::enums::DeviceEnum;
@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 device_enum! {
     /// Instruction sets that kernels have forms for.
     pub enum Level: "LEVEL" {
-        /// None of them, as on a GPU.
+        /// None of the others, as on a GPU.
         Generic,
         /// ARM's 128-bit vectors.
         Neon,
@@ -40,10 +40,10 @@ impl Level {
     }
 }
 
-/// The level's name; `generic` where it is none of those that kernels have forms for, as on a GPU.
+/// The level's name; `generic` if kernels have no form for it, as on a GPU.
 ///
 /// # Errors
-/// [`Error::Internal`] when the smallest of kernels does not build or run: then none does.
+/// [`Error::Internal`] if the smallest of kernels does not build or run: then none does.
 pub(super) fn of(device: &mut Device) -> Result<&'static str> {
     let variant = Variant::new("level", None, &[]);
     let source =

@@ -1,4 +1,4 @@
-//! The only home of opencl3 and of `unsafe`: one context, its programs and buffers, and running a plan's calls.
+//! The only module that uses opencl3 and `unsafe`: one context, its programs and buffers, and the launches of kernels.
 //!
 //! A [`Device`] lives on the thread that opened it (the job engine's), so that everything else stays free of OpenCL.
 
@@ -43,30 +43,30 @@ use program::{Source, Variant};
 
 /// Steps of a work-item in the first launch: a few milliseconds of any kernel.
 const FIRST_STEPS: u32 = 1 << 14;
-/// Uploads below so many bytes are copied where their padding is added.
+/// Uploads of fewer bytes than this are copied to add their padding.
 const SMALL: usize = 1 << 20;
 
-/// The choice of a device, and of its kernels.
+/// The choice of a device and of its kernels.
 #[derive(Debug, Clone)]
 pub struct DeviceConfig {
     /// `pocl`, `gpu`, or part of a platform's or device's name.
     pub target: String,
-    /// Overrides the lanes (1, 4, 8 or 16).
+    /// The number of lanes (1, 4, 8 or 16) in place of the device's own.
     pub lanes: Option<u32>,
-    /// Kernel files are read from here instead of the binary.
+    /// The folder from which kernel files are read instead of the binary.
     pub kernels: Option<PathBuf>,
-    /// True if views sample volumes as 3D images; by default where the device is a GPU that can.
+    /// True if views sample volumes as 3D images; by default on a GPU that supports them.
     pub images: Option<bool>,
-    /// True if a compiler's warning fails a build: in tests. In service it would take a technique away for nothing.
+    /// True if a compiler's warning fails a build, as in tests. In service it would disable a technique for nothing.
     pub strict: bool,
-    /// Steps that a work-item may take in the first launch; tests ask for few, so that launches leave something undone.
+    /// Steps that a work-item may take in the first launch. Tests ask for few, so that launches leave work undone.
     pub first_steps: u32,
-    /// This program, which compiles kernels ahead in processes of its own where it is given; else each is built when first used.
+    /// This program, which compiles kernels ahead in processes of its own, if given; else each kernel is built when first used.
     pub compiler: Option<PathBuf>,
 }
 
 impl DeviceConfig {
-    /// The CPU's PoCL with what it likes; each kernel is built when first used.
+    /// The CPU's PoCL with its own defaults; each kernel is built when first used.
     pub fn pocl() -> Self {
         Self {
             target: "pocl".into(),
@@ -123,12 +123,12 @@ impl Device {
     /// Opens the device that `config` names.
     ///
     /// # Errors
-    /// [`Error::Internal`] when there is none or OpenCL fails.
+    /// [`Error::Internal`] if there is none or OpenCL fails.
     pub fn open(config: &DeviceConfig) -> Result<Self> {
         let (device, mut info) = select(&config.target, config.lanes)?;
         info.use_images(config.images);
         let context = cl("creating the context", Context::from_device(&device))?;
-        // The 1.x form: PoCL 3.1 and NVIDIA's OpenCL both have it.
+        // The call is the OpenCL 1.x form, which both PoCL 3.1 and NVIDIA's OpenCL have.
         let queue = cl("creating the queue", CommandQueue::create_default(&context, 0))?;
         info.image_formats_3d = images::formats(&context);
         let (kernels, strict, first_steps) = (HashMap::new(), config.strict, config.first_steps);
@@ -148,7 +148,7 @@ impl Device {
         self.first_steps
     }
 
-    /// Lets the device say what was given up before it was opened so.
+    /// Adds the attempts that were given up before the device was opened to its description.
     pub fn note_given_up(&mut self, gave_up: Vec<String>) {
         self.info.gave_up = gave_up;
     }
@@ -158,23 +158,22 @@ impl Device {
         self.kernels.contains_key(variant)
     }
 
-    /// The options that a variant is built with here.
+    /// The build options of a variant on this device.
     fn options(&self, variant: &Variant) -> String {
         variant.options(self.info.lanes, self.info.volumes_are_images, self.strict)
     }
 
-    /// A hash of all that the compiled form of a variant depends on: its text, its options, the device and its driver.
+    /// A hash of everything on which the compiled form of a variant depends: its text, its options, the device and its driver.
     ///
     /// # Errors
-    /// [`Error::Internal`] when a kernel file is missing.
+    /// [`Error::Internal`] if a kernel file is missing.
     pub fn fingerprint(&self, source: &Source, variant: &Variant) -> Result<String> {
         let (text, info) = (source.text(self.overrides.as_deref())?, &self.info);
         let all = [&text, &self.options(variant), &info.platform_version, &info.device, &info.driver, info.level];
         Ok(blake3::hash(all.join("\0").as_bytes()).to_hex()[..32].to_owned())
     }
 
-    /// Builds a variant unless it is there already. PoCL compiles for real at the first launch, so a caller that wants it
-    /// warm launches it once.
+    /// Builds a variant unless it is built already. PoCL really compiles at the first launch, so a caller that wants it warm launches it once.
     ///
     /// # Errors
     /// [`Error::Internal`] with the build log.
@@ -202,24 +201,24 @@ impl Device {
     /// A buffer of `bytes` bytes (at least 1), not yet written.
     ///
     /// # Errors
-    /// [`Error::Internal`] when the device has no room.
+    /// [`Error::Internal`] if the device has no room.
     pub fn allocate(&self, bytes: usize) -> Result<Buffer> {
         let bytes = bytes.max(1);
-        // SAFETY: no host pointer is given, so there is no memory of ours whose validity matters.
+        // SAFETY: no host pointer is given, so no memory of ours has to be valid.
         let memory = unsafe { ClBuffer::create(&self.context, CL_MEM_READ_WRITE, bytes, ptr::null_mut()) };
         Ok(Buffer { memory: Memory::Bytes(cl("allocating a buffer", memory)?), bytes })
     }
 
-    /// A buffer that holds `data`, which is not empty: without a command in the queue, of which each takes as long as some hundred kilobytes.
+    /// A buffer that holds `data`, which is not empty. It needs no command in the queue; a command takes as long as some hundred kilobytes.
     fn allocate_with(&self, data: &mut [u8]) -> Result<Buffer> {
         let (flags, host) = (CL_MEM_READ_WRITE | CL_MEM_COPY_HOST_PTR, data.as_mut_ptr().cast());
-        // SAFETY: `host` points to as many bytes as are asked for, and they are copied before the call returns.
+        // SAFETY: `host` points to as many bytes as the call copies, and the copy ends before the call returns.
         let memory = unsafe { ClBuffer::create(&self.context, flags, data.len(), host) };
         Ok(Buffer { memory: Memory::Bytes(cl("allocating a buffer", memory)?), bytes: data.len() })
     }
 
-    /// A buffer of `bytes` bytes, of what was written before or not at all: `room` where that is as large. Memory that has been in use is there
-    /// at once; of new memory the system hands out every page when it is first touched.
+    /// A buffer of `bytes` bytes with undefined content: `room` if that is as large. Memory that has been in use is available at once; the system
+    /// hands out each page of new memory when it is first touched.
     ///
     /// # Errors
     /// As [`Device::allocate`].
@@ -246,7 +245,7 @@ impl Device {
     /// Writes `data` at `offset`.
     ///
     /// # Errors
-    /// [`Error::Internal`] when it does not fit or OpenCL fails.
+    /// [`Error::Internal`] if it does not fit or OpenCL fails.
     pub fn write(&self, buffer: &mut Buffer, offset: usize, data: &[u8]) -> Result<()> {
         if data.is_empty() {
             return Ok(());

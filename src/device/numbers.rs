@@ -3,7 +3,7 @@
 /// Voxels along an edge of a macro-cell: `CELL` of all kernels.
 pub const CELL: usize = 4;
 
-/// A number as the kernels know it.
+/// The `#define` of a number for the kernels.
 pub fn define(name: &str, value: impl std::fmt::Display) -> String {
     format!("#define {name} {value}\n")
 }

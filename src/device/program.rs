@@ -1,4 +1,4 @@
-//! The kernels' text and the variants that may be built: all of them are listed, none is made up at run time.
+//! The kernels' text, and the variants that may be built. All variants are listed; none is composed at run time.
 
 use std::path::Path;
 
@@ -33,7 +33,7 @@ pub fn each_voxel_type<F: AsRef<[(&'static str, i32)]>>(kernel: &'static str, li
 /// The features of `list` that are `wanted`, for a variant of `kernel`.
 ///
 /// # Errors
-/// [`Error::Internal`] naming the features when they are not listed: no kernel was tested with them.
+/// [`Error::Internal`] naming the features if they are not listed: no kernel was tested with them.
 pub fn listed<F>(kernel: &str, list: &'static [F], wanted: F) -> Result<&'static F>
 where
     F: AsRef<[(&'static str, i32)]> + PartialEq,
@@ -45,17 +45,17 @@ where
 /// One permitted build of one kernel function.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Variant {
-    /// The kernel's file, `kernels/<name>.cl`: that of its [`Source`].
+    /// The name of the kernel's file, `kernels/<name>.cl`: that of its [`Source`].
     pub kernel: &'static str,
     /// The kernel function in it.
     pub function: &'static str,
-    /// The volume's voxel type, where the kernel reads a volume.
+    /// The volume's voxel type, if the kernel reads a volume.
     pub voxel: Option<VoxelType>,
-    /// Features compiled in, `-D NAME=VALUE`.
+    /// The compiled-in features, `-D NAME=VALUE`.
     pub features: Features,
 }
 
-/// The source of a program: its file, and what the host adds to it.
+/// The source of a program: its file, and the text that the host adds.
 #[derive(Debug, Clone)]
 pub struct Source {
     /// The kernel file's name, without `.cl`.
@@ -66,15 +66,15 @@ pub struct Source {
     pub structs: fn() -> Vec<Layout>,
     /// Every variant that may be built.
     pub variants: fn() -> Vec<Variant>,
-    /// The number of variants, from the first, that are built before the service is ready; the others are built when first asked for.
+    /// The number of variants, from the first on, that are built before the service is ready; the others are built when first asked for.
     pub common: usize,
 }
 
 impl Source {
-    /// The whole text in one string: the structs, then the kernel file with all that it includes.
+    /// The whole text in one string: the structs, then the kernel file with all its includes.
     ///
     /// # Errors
-    /// [`Error::Internal`] when a file is missing, or files include each other in a circle.
+    /// [`Error::Internal`] if a file is missing, or files include each other in a circle.
     pub fn text(&self, overrides: Option<&Path>) -> Result<String> {
         let kernel = assemble(&format!("{}.cl", self.kernel), &|name| read(overrides, name))?;
         let structs: String = (self.structs)().iter().map(|layout| (layout.opencl_text)()).collect();
@@ -89,13 +89,13 @@ impl Variant {
         Self { kernel, function: kernel, voxel, features }
     }
 
-    /// The same of another kernel function in the file.
+    /// The variant of another kernel function in the same file.
     pub const fn of_function(self, function: &'static str) -> Self {
         Self { function, ..self }
     }
 
-    /// The build options; `strict` makes warnings errors, as tests do. Not `-cl-fast-relaxed-math`: it would let the compiler
-    /// assume that no NaN occurs.
+    /// The build options; `strict` makes warnings errors, as tests do. They exclude `-cl-fast-relaxed-math`, which would let the compiler assume that
+    /// no NaN occurs.
     pub fn options(&self, lanes: u32, images: bool, strict: bool) -> String {
         let mut options = format!("-cl-std=CL1.2 -cl-mad-enable -cl-no-signed-zeros -DLANES={lanes}");
         if strict {
@@ -113,7 +113,8 @@ impl Variant {
         options
     }
 
-    /// A name for logs, such as `emission_absorption u8 SHADED=1`; a function of another name than its file follows that and a dot.
+    /// A name for logs, such as `emission_absorption u8 SHADED=1`. If the function's name differs from the file's, it follows the file's name and a
+    /// dot.
     pub fn label(&self) -> String {
         let voxel = self.voxel.map(|v| format!(" {v:?}").to_lowercase()).unwrap_or_default();
         let function = if self.function == self.kernel { String::new() } else { format!(".{}", self.function) };

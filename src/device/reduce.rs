@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 
 /// Values that a work-item reduces: `BLOCK` of the kernels.
 const BLOCK: usize = 1024;
-/// The file of the kernels.
+/// The name of the kernels' file.
 const KERNEL: &str = "reduce";
 
 const SUM: Variant = Variant::new(KERNEL, None, &[]).of_function("sum");
@@ -25,12 +25,12 @@ pub fn source() -> Source {
     }
 }
 
-/// The variants that a process with reductions names among its kernels.
+/// The variants that a process lists among its kernels if it uses reductions.
 pub fn variants() -> [Variant; 3] {
     [SUM, DOT_PRODUCT, EXTREMES]
 }
 
-/// Reduces buffers of at most so many floats, whose kernels are built.
+/// Reduces buffers of at most a given number of floats. Its kernels are built.
 pub struct Reduction {
     count: Buffer,
     partials: Buffer,
@@ -38,10 +38,10 @@ pub struct Reduction {
 }
 
 impl Reduction {
-    /// Room for buffers of `most` floats.
+    /// Allocates memory for buffers of `most` floats.
     ///
     /// # Errors
-    /// [`Error::Internal`] when the device has no room.
+    /// [`Error::Internal`] if the device has no room.
     pub fn new(device: &Device, most: usize) -> Result<Self> {
         let partials = device.allocate(most.div_ceil(BLOCK) * size_of::<[f32; 2]>())?;
         Ok(Self { count: device.allocate(size_of::<i32>())?, partials, most })
@@ -70,12 +70,12 @@ impl Reduction {
     /// Σ a over the first `count` floats, with a relative error of about 10⁻¹³ · Σ |a| / |Σ a|.
     ///
     /// # Errors
-    /// [`Error::Internal`] when a buffer is too short or the device fails.
+    /// [`Error::Internal`] if a buffer is too short or the device fails.
     pub fn sum(&mut self, device: &Device, a: &Buffer, count: usize) -> Result<f64> {
         Ok(total(&self.partials(device, &SUM, &[a], count)?))
     }
 
-    /// Σ a b over the first `count` floats of each, likewise.
+    /// Σ a b over the first `count` floats of each, with the same relative error.
     ///
     /// # Errors
     /// As [`Reduction::sum`].
@@ -83,7 +83,7 @@ impl Reduction {
         Ok(total(&self.partials(device, &DOT_PRODUCT, &[a, b], count)?))
     }
 
-    /// The least and the greatest of the first `count` floats that are finite; none where no float is.
+    /// The least and the greatest of the first `count` floats that are finite; `None` if no float is.
     ///
     /// # Errors
     /// As [`Reduction::sum`].
@@ -95,7 +95,7 @@ impl Reduction {
     }
 }
 
-/// The blocks' sums, in their order.
+/// The total of the blocks' sums, in their order.
 fn total(partials: &[[f32; 2]]) -> f64 {
     partials.iter().map(|[sum, lost]| f64::from(*sum) + f64::from(*lost)).sum()
 }

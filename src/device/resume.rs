@@ -1,4 +1,4 @@
-//! Launches that are bounded in steps: what a work-item has not done by then it does in the next launch (`kernels/shared/resume.h`).
+//! Launches that are bounded in steps. A work-item continues its unfinished work in the next launch (`kernels/shared/resume.h`).
 
 use std::time::Duration;
 
@@ -6,31 +6,31 @@ use super::numbers::define;
 use super::{Buffer, Device};
 use crate::error::Result;
 
-/// Words before the work-items' own, and before the lanes' words of each: `RESUME_HEADER`.
+/// Words before those of all work-items, and words of a work-item before its lanes': `RESUME_HEADER`.
 const HEADER: usize = 16;
-/// Fewer or more steps than these are not worth a launch or cannot be counted.
+/// The range of steps: fewer are not worth a launch, and more cannot be counted.
 const STEPS: [u32; 2] = [1 << 6, 1 << 28];
-/// The state of all work-items of a launch takes at most about this.
+/// The approximate most bytes of the state of all work-items of a launch.
 const MOST_BYTES: usize = 1 << 26;
-/// By how much the steps change from one launch to the next, at most.
+/// The least and the greatest factor by which the steps change from one launch to the next.
 const CHANGE: [f64; 2] = [0.25, 4.0];
 
-/// The state of work-items between launches, and how many steps a launch may take.
+/// The state of work-items between launches, and the number of steps of a launch.
 pub struct Resume {
     state: Buffer,
     /// Words of a lane.
     words: usize,
     steps: u32,
-    /// How often work-items have had more to do, as the state counts it.
+    /// The number of times that work-items have had more to do, as the state counts it.
     counted: u32,
     has_more: bool,
 }
 
 impl Resume {
-    /// For a kernel whose lanes keep so many words.
+    /// The state of a kernel whose lanes keep `words` words.
     ///
     /// # Errors
-    /// [`crate::error::Error::Internal`] when the device has no room.
+    /// [`crate::error::Error::Internal`] if the device has no room.
     pub fn new(device: &Device, words: usize) -> Result<Self> {
         let state = device.upload(&[0; 4 * HEADER], 0)?;
         Ok(Self { state, words, steps: device.first_steps(), counted: 0, has_more: false })
@@ -41,7 +41,7 @@ impl Resume {
         define("RESUME_HEADER", HEADER) + &define(&format!("{name}_STATE_WORDS"), words)
     }
 
-    /// The same of a kernel whose work-item is a beam of packets: words of a lane for each packet.
+    /// The same for a kernel whose work-item is a beam of packets: words of a lane for each packet.
     pub fn opencl_text_of_beams(name: &str, words: usize) -> String {
         define("RESUME_HEADER", HEADER) + &define(&format!("{name}_STATE_WORDS"), format!("({words} * PACKETS)"))
     }
@@ -56,7 +56,7 @@ impl Resume {
         self.steps
     }
 
-    /// True if work-items of the last launch have more to do: the next one has to be of the same, and resume them.
+    /// True if work-items of the last launch have more to do. The next launch must be of the same work-items, and resume them.
     pub fn has_more(&self) -> bool {
         self.has_more
     }
@@ -71,7 +71,7 @@ impl Resume {
         4 * (HEADER + self.words * device.info().lanes as usize)
     }
 
-    /// Makes ready for a launch of `items` work-items.
+    /// Prepares a launch of `items` work-items.
     ///
     /// # Errors
     /// As [`Resume::new`].
@@ -86,7 +86,7 @@ impl Resume {
         Ok(())
     }
 
-    /// Learns whether a launch has left anything undone, and how many steps fit in `slice` where it took so long.
+    /// Notes if the launch has left work undone, and sets the steps of the next launch so that it fits in `slice`; `took` is the time of this one.
     ///
     /// # Errors
     /// As [`Device::read`].

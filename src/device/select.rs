@@ -23,7 +23,7 @@ pub struct DeviceInfo {
     pub driver: String,
     /// Compute units (cores).
     pub compute_units: u32,
-    /// Clock in MHz, as the driver states it.
+    /// The clock in MHz, as the driver states it.
     pub clock_mhz: u32,
     /// Device memory in bytes.
     pub global_memory_bytes: u64,
@@ -33,7 +33,7 @@ pub struct DeviceInfo {
     pub local_memory_bytes: u64,
     /// The largest work-group.
     pub largest_work_group: usize,
-    /// Floats that the device likes in a vector: what the lanes are chosen by.
+    /// Floats in the device's preferred vector, which decides the number of lanes.
     pub native_vector_width_float: u32,
     /// True if images (textures) are supported.
     pub image_support: bool,
@@ -45,9 +45,9 @@ pub struct DeviceInfo {
     pub sampler_modes: &'static [&'static str],
     /// True if views read volumes as images, filtered by the device's sampler; otherwise from buffers, by the kernels.
     pub volumes_are_images: bool,
-    /// The same in words, with its precision.
+    /// The source of samples (image or buffer) in words, with its precision.
     pub volume_sampling: &'static str,
-    /// True if 64-bit integer atomics are there (photon transport needs them).
+    /// True if the device has 64-bit integer atomics (photon transport needs them).
     pub int64_atomics: bool,
     /// Rays or photons that one work-item carries here.
     pub lanes: u32,
@@ -59,7 +59,7 @@ pub struct DeviceInfo {
     pub local_size: usize,
 }
 
-/// OpenCL C 1.2 promises these wherever there are images.
+/// The modes that OpenCL C 1.2 guarantees if a device has images.
 const SAMPLER_MODES: &[&str] = &[
     "filter nearest",
     "filter linear",
@@ -76,12 +76,12 @@ const FROM_BUFFERS: &str =
 const FROM_IMAGES: &str = "image: trilinear by the device's sampler, whose weights have 8 fractional bits on a GPU";
 
 impl DeviceInfo {
-    /// True if it is PoCL's: that compiles at the first launch, and keeps what it compiled for other processes too.
+    /// True if it is a PoCL device. PoCL compiles at the first launch, and keeps the result for other processes too.
     pub fn is_pocl(&self) -> bool {
         self.platform.contains("Portable Computing Language")
     }
 
-    /// Takes volumes as images where `target` says so, or by default on a GPU that has them; then a work-item is one ray.
+    /// Selects images for volumes if `target` says so, or by default on a GPU that supports them. Then a work-item is one ray.
     pub(super) fn use_images(&mut self, target: Option<bool>) {
         self.volumes_are_images = self.image_support && target.unwrap_or(self.kind == "gpu" && self.lanes == 1);
         if self.volumes_are_images {
@@ -91,7 +91,7 @@ impl DeviceInfo {
     }
 }
 
-/// Advice for a machine on which no OpenCL device can be used.
+/// Advice for a machine without a usable OpenCL device.
 pub const NO_DEVICE: &str = "there is no usable OpenCL device: install PoCL for the processor (Debian and Ubuntu: \
     apt install pocl-opencl-icd ocl-icd-libopencl1 binutils) or the graphics card's OpenCL driver; `cloudchamber device` lists what \
     there is, --device NAME chooses, and --lanes 4 or --lanes 1 asks for less of the compiler";
@@ -148,7 +148,7 @@ fn describe(platform: &Platform, device: &ClDevice, forced_lanes: Option<u32>) -
         lanes,
         level: "",
         gave_up: Vec::new(),
-        // A CPU work-item is already a packet, so a group is only the unit that threads share out; a GPU wants whole warps.
+        // A CPU work-item is already a packet, so a group is only the unit that threads share out; a GPU needs whole warps.
         local_size: if kind == "gpu" { GPU_GROUP } else { 4 },
     })
 }
@@ -156,10 +156,10 @@ fn describe(platform: &Platform, device: &ClDevice, forced_lanes: Option<u32>) -
 /// Every OpenCL device here, with its description.
 ///
 /// # Errors
-/// [`Error::Internal`] when there is no OpenCL at all, with how to install it.
+/// [`Error::Internal`] if there is no OpenCL at all, with advice on its installation.
 pub fn list(forced_lanes: Option<u32>) -> Result<Vec<(ClDevice, DeviceInfo)>> {
     let missing = NO_DEVICE;
-    // The ICD loader is opened at run time: without it, cl3 panics in its lazy initialiser instead of returning an error.
+    // The ICD loader is opened at run time. Without it, cl3 panics in its lazy initialiser instead of returning an error.
     let platforms = std::panic::catch_unwind(get_platforms)
         .map_err(|_| Error::internal(missing))?
         .map_err(|e| Error::internal(format!("{missing} ({e})")))?;
@@ -178,7 +178,7 @@ pub fn list(forced_lanes: Option<u32>) -> Result<Vec<(ClDevice, DeviceInfo)>> {
 /// platform or name contains the target, in any case.
 ///
 /// # Errors
-/// [`Error::Internal`] when none fits; the message lists what there is.
+/// [`Error::Internal`] if none fits; the message lists the devices.
 pub fn select(target: &str, forced_lanes: Option<u32>) -> Result<(ClDevice, DeviceInfo)> {
     let devices = list(forced_lanes)?;
     let names: Vec<String> = devices.iter().map(|(_, i)| format!("{} / {}", i.platform, i.device)).collect();

@@ -1,7 +1,7 @@
-//! The parameters of a kernel function by name, as its own text declares them.
+//! The parameters of a kernel function by name, as its text declares them.
 //!
-//! OpenCL knows arguments by number only, and tells their names only where a program is built with `-cl-kernel-arg-info`, which not
-//! every driver honours. The text says the same everywhere.
+//! OpenCL knows arguments by number only. It gives their names only if a program is built with `-cl-kernel-arg-info`, which not every driver honours.
+//! The text is the same everywhere.
 
 use crate::error::{Error, Result};
 
@@ -41,7 +41,7 @@ fn tokens(text: &str) -> Vec<&str> {
     found
 }
 
-/// The length of a directive, which ends with its line, unless that is continued.
+/// The length of a directive. It ends with its line, unless that is continued.
 fn directive_length(text: &str) -> usize {
     let mut from = 0;
     while let Some(end) = text[from..].find('\n') {
@@ -53,7 +53,7 @@ fn directive_length(text: &str) -> usize {
     text.len()
 }
 
-/// The number of tokens that the parentheses at the beginning enclose, with themselves.
+/// The number of tokens that the parentheses at the beginning enclose, including the parentheses.
 fn enclosed(tokens: &[&str]) -> usize {
     let mut depth = 0;
     let closes = |token: &&str| {
@@ -66,7 +66,7 @@ fn enclosed(tokens: &[&str]) -> usize {
 /// The parameters of the kernel function `function` in a program's text, in order.
 ///
 /// # Errors
-/// [`Error::Internal`] when there is no such function, or its parameters depend on a condition or have no names.
+/// [`Error::Internal`] if there is no such function, or its parameters depend on a condition or have no names.
 pub(super) fn parameters(text: &str, function: &str) -> Result<Vec<Parameter>> {
     let tokens = tokens(text);
     let kernels = (0..tokens.len()).filter(|&i| ["kernel", "__kernel"].contains(&tokens[i])).map(|i| &tokens[i + 1..]);
@@ -100,7 +100,7 @@ fn parameters_of_list(function: &str, list: &[&str]) -> Result<Vec<Parameter>> {
     Ok(parameters)
 }
 
-/// The place of each of the arguments `names` among the parameters. These are few: to search them costs less than to hash a name.
+/// The index of each of the arguments `names` among the parameters. There are few of them, so a search costs less than hashing a name.
 ///
 /// # Errors
 /// [`Error::Internal`] naming an argument that is unknown or doubled, or a parameter without an argument.

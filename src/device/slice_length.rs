@@ -1,17 +1,17 @@
-//! How much work fits in a slice. It is learnt per run: the same kernel is fast on one scene and slow on another.
+//! The amount of work that fits in a slice. It is learnt per run: the same kernel is fast on one scene and slow on another.
 
 use std::time::Duration;
 
 use super::DeviceInfo;
 
-/// Rays or histories per millisecond that any device here manages: where a run starts.
+/// Rays or histories per millisecond at the start of a run: every device here achieves this.
 const START_PER_MS: f64 = 50.0;
-/// Samples along rays per millisecond and compute unit that a slow kernel manages: bounds a slice by its longest rays.
+/// Samples along rays per millisecond and compute unit that a slow kernel achieves. It bounds a slice by its longest rays.
 const SAMPLES_PER_MS_PER_UNIT: f64 = 5e4;
-/// A slice takes at most about this, should every ray in it be as long as the longest.
+/// The approximate most time of a slice if every ray in it is as long as the longest.
 const WORST_MS: f64 = 100.0;
 
-/// How much more a slice may be of a kernel whose speed is known.
+/// The factor by which a slice may be longer if the kernel's speed is known.
 const KNOWN: f64 = 4.0;
 
 /// The speed of one run.
@@ -23,26 +23,25 @@ pub struct SliceLength {
 }
 
 impl SliceLength {
-    /// A run whose rays have at most `steps` steps each (1 where there are none); `speed` is what the kernel managed of late, rays a
-    /// millisecond, of which half is taken to start with, since it may have been an easier scene.
+    /// A run whose rays have at most `steps` steps each (1 if there are none). `speed` is the kernel's recent speed in rays per millisecond. The run
+    /// starts with half of it, since that may have been an easier scene.
     pub fn new(info: &DeviceInfo, steps: f64, speed: Option<f64>) -> Self {
         let slow = WORST_MS * SAMPLES_PER_MS_PER_UNIT * f64::from(info.compute_units) / steps.max(1.0);
-        // A kernel that has shown that it is not slow may take more, should its rays be no worse than those of the picture before.
+        // A kernel that was not slow so far may take more, if its rays are no worse than those of the picture before.
         let shown = speed.map_or(0.0, |per_ms| WORST_MS * per_ms).min(KNOWN * slow);
         let per_ms = (0.5 * speed.unwrap_or(0.0)).max(START_PER_MS);
         Self { per_ms, slowest: f64::INFINITY, most: slow.max(shown) as usize }
     }
 
-    /// Work-items, of `width` rays or histories each, for about `slice`: whole work-groups, so that the next slice starts where
-    /// this one ends.
+    /// Work-items, of `width` rays or histories each, for about `slice`: whole work-groups, so that the next slice starts at the end of this one.
     pub fn items(&self, info: &DeviceInfo, slice: Duration, width: usize) -> usize {
         let wanted = ((self.per_ms * slice.as_secs_f64() * 1e3) as usize).min(self.most);
         (wanted / width).div_ceil(info.local_size).max(1) * info.local_size
     }
 
-    /// Learns from a launch. The speed rises at most fourfold at a time and stays within four times the slowest of late: the
-    /// next rows of a picture may be as dense as the densest before. A slow launch is forgotten by half again each time, since
-    /// it may have been somebody else's doing; one of less than a millisecond tells of launching, not of the work.
+    /// Learns from a launch. The speed rises at most fourfold at a time and stays within four times the slowest recent one: the next rows of a
+    /// picture may be as dense as the densest before. A slow launch is forgotten by half again each time, since another program may have caused it. A
+    /// launch of less than a millisecond measures the launching instead of the work.
     pub fn learn(&mut self, items: usize, width: usize, took: Duration) {
         let now = (items * width) as f64 / (took.as_secs_f64() * 1e3).max(1e-3);
         if took >= Duration::from_millis(1) {

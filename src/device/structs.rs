@@ -1,6 +1,6 @@
-//! Parameters are declared once: [`device_struct!`](crate::device_struct) makes the Rust struct, its OpenCL C text and its
-//! offsets from one declaration. Only 4-byte scalars and arrays of them: OpenCL promises nothing about how `float3` lies in
-//! a struct that the host and the device share.
+//! Parameters are declared once: [`device_struct!`](crate::device_struct) makes the Rust struct, its OpenCL C text and its offsets from one
+//! declaration. Fields are 4-byte scalars and arrays of them: OpenCL guarantees nothing about the layout of `float3` in a struct that the host and
+//! the device share.
 
 /// A type that may stand in a device struct.
 pub trait DeviceField {
@@ -34,12 +34,12 @@ pub trait DeviceStruct: bytemuck::Pod {
     fn offsets() -> Vec<(&'static str, usize)>;
     /// The OpenCL C `typedef`.
     fn opencl_text() -> String;
-    /// All of this, as data.
+    /// The layout, as data.
     const LAYOUT: Layout =
         Layout { name: Self::NAME, offsets: Self::offsets, size: size_of::<Self>(), opencl_text: Self::opencl_text };
 }
 
-/// How a struct that the host and the device share lies in memory: a [`DeviceStruct`] as data.
+/// The layout of a struct that the host and the device share: a [`DeviceStruct`] as data.
 #[derive(Debug, Clone, Copy)]
 pub struct Layout {
     /// Its name in Rust and in OpenCL C.
@@ -95,7 +95,7 @@ device_struct! {
         pub right: [f32; 3],
         /// One pixel down on that plane, index units.
         pub down: [f32; 3],
-        /// From the eye to `plane`, index units (orthographic: the view direction).
+        /// The displacement from the eye to `plane`, index units (orthographic: the view direction).
         pub towards: [f32; 3],
         /// The same in world units.
         pub towards_world: [f32; 3],
@@ -113,19 +113,19 @@ device_struct! {
         pub width: i32,
         /// Height of this pass in its own pixels.
         pub height: i32,
-        /// Width of the full image: numbers the pixels for the random numbers.
+        /// Width of the full image, by which pixels are numbered for the random numbers.
         pub full_width: i32,
-        /// This pass renders every `stride`-th pixel of the full image.
+        /// The stride: this pass renders every `stride`-th pixel of the full image.
         pub stride: i32,
         /// Number of the first beam of this launch.
         pub first_beam: i32,
-        /// Steps that a work-item may take in this launch; 0 where none takes so many.
+        /// Steps that a work-item may take in this launch; 0 for no bound.
         pub most_steps: u32,
-        /// 1 if the work-items go on with what the launch before has left.
+        /// 1 if the work-items resume the state that the launch before has left.
         pub resumed: i32,
         /// Number of the sample in its film, from 0.
         pub sample: i32,
-        /// The film's number: each film has random numbers of its own.
+        /// The film's number. Each film has random numbers of its own.
         pub stream: u32,
         /// The request's seed.
         pub seed: [u32; 2],
@@ -141,11 +141,11 @@ device_struct! {
         pub planes: i32,
         /// Four numbers a plane, index units: a x + b y + c z + d is not negative where the volume is shown.
         pub plane_index: [f32; 4 * PLANES],
-        /// Row by row: world gradient = this × gradient in index units.
+        /// The matrix, row by row, from a gradient in index units to the world.
         pub world_gradient_from_index: [f32; 9],
-        /// The square of what a gradient's magnitude in index units is multiplied by, where it is the same in all directions; else 0.
+        /// The squared factor from a gradient's magnitude in index units to the world, if it is the same in all directions; else 0.
         pub isotropic_squared: f32,
-        /// The square of the gradient (raw values per world unit) below which there is no telling where it points.
+        /// The squared magnitude of a gradient (raw values per world unit) below which its direction is unknown.
         pub flat_squared: f32,
         /// Weight of light from everywhere.
         pub ambient: f32,
@@ -153,13 +153,13 @@ device_struct! {
         pub shininess: f32,
         /// The number of lights.
         pub lights: i32,
-        /// Towards each light, world space, unit length.
+        /// The directions towards the lights, world space, unit length.
         pub light_direction: [f32; 3 * LIGHTS],
-        /// Its product with a gradient in index units is that of `light_direction` with the gradient in the world.
+        /// The covectors whose product with a gradient in index units is that of `light_direction` with the gradient in the world.
         pub light_index: [f32; 3 * LIGHTS],
-        /// Linear colour of each light times the weight of Lambert's term.
+        /// The linear colour of each light times the weight of Lambert's term.
         pub lambert: [f32; 3 * LIGHTS],
-        /// Linear colour of each light times the weight of the highlight.
+        /// The linear colour of each light times the weight of the highlight.
         pub highlight: [f32; 3 * LIGHTS],
     }
 }

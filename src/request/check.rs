@@ -1,4 +1,4 @@
-//! Bodies against their schemas, with our words for what is wrong.
+//! The check of bodies against their schemas, with our own words for errors.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -21,7 +21,7 @@ pub fn parse<T: DeserializeOwned>(value: &Value, schema: &'static Value, at: &st
 /// Deserialises a value that has been checked against its schema, as part of a whole body.
 ///
 /// # Errors
-/// [`Error::Invalid`] where the schema permits more than the type.
+/// [`Error::Invalid`] if the schema permits more than the type.
 pub fn read<T: DeserializeOwned>(value: &Value, at: &str) -> Result<T> {
     let value = with_whole_numbers(value);
     T::deserialize(&value)
@@ -52,7 +52,7 @@ pub fn check(value: &Value, schema: &'static Value, at: &str) -> Result<()> {
     if violations.is_empty() { Ok(()) } else { Err(Error::Invalid(violations)) }
 }
 
-/// The compiled schema. They are few, and compiling one takes longer than checking a request.
+/// The compiled schema, which is kept. Schemas are few, and compiling one takes longer than checking a request.
 fn validator(schema: &'static Value) -> Result<Arc<jsonschema::Validator>> {
     static COMPILED: Mutex<Vec<(&Value, Arc<jsonschema::Validator>)>> = Mutex::new(Vec::new());
     let mut compiled = COMPILED.lock().unwrap_or_else(PoisonError::into_inner);
@@ -127,7 +127,7 @@ fn permitted_range(schema: &Value, path: &str) -> Option<String> {
     }
 }
 
-/// What a value may be that is one of several named ones, each with its description.
+/// The permitted values of a field that is one of several named ones, each with its description.
 fn permitted_names<'s>(schema: &'s Value, path: &str) -> Vec<&'s Value> {
     fn names(s: &Value) -> Vec<&Value> {
         let several = ["oneOf", "anyOf"].into_iter().filter_map(|of| s.get(of)?.as_array()).flatten();

@@ -5,15 +5,15 @@ use std::sync::{Mutex, PoisonError};
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde_json::{Value, json};
 
-/// What `make` makes for this `key`, made once and kept for good: schemas are asked for with each request, are few, and take longer to make
-/// than a request to check.
+/// The result of `make` for this `key`, made once and kept for good. Each request asks for schemas; they are few, and take longer to make than a
+/// request to check.
 pub fn kept(key: &str, make: impl FnOnce() -> Value) -> &'static Value {
     static KEPT: Mutex<Vec<(String, &'static Value)>> = Mutex::new(Vec::new());
     let find = |kept: &[(String, &'static Value)]| kept.iter().find(|(known, _)| known == key).map(|(_, value)| *value);
     let lock = || KEPT.lock().unwrap_or_else(PoisonError::into_inner);
     let known = find(&lock());
     known.unwrap_or_else(|| {
-        // Not under the lock: making one asks for others. Of two that are made at a time the first stays.
+        // The lock is not held, since making one asks for others. Of two that are made at a time the first stays.
         let made = make();
         let mut kept = lock();
         find(&kept).unwrap_or_else(|| {

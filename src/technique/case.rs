@@ -1,14 +1,14 @@
-//! What tests run of a technique: it says so itself, and the tests go through the list.
+//! The tests of a technique. It lists its own cases, and the tests go through the list of techniques.
 
 use serde_json::{Value, json};
 
-/// Own parameters that tests run, a view's on volumes of every type of voxels. Instead of an id they name a volume of the tests:
-/// `{"test": "labels"}`.
+/// A technique's own parameters for a test. A view's run on volumes of every voxel type. Instead of an id they name a volume of the tests: `{"test":
+/// "labels"}`.
 #[derive(Debug, Clone)]
 pub struct Case {
     /// The parameters.
     pub own: Value,
-    /// True if it runs on a volume of one value too: kernels may take another way through such a box.
+    /// True if it runs on a volume of one value too: kernels may treat such a box differently.
     pub is_even_too: bool,
 }
 
@@ -18,12 +18,12 @@ impl From<Value> for Case {
     }
 }
 
-/// All that tests run of a technique.
+/// All cases of a technique.
 #[derive(Debug, Clone)]
 pub struct Cases {
-    /// Between them they run every variant of its kernels, and no other.
+    /// The cases. Together they run every variant of its kernels, and no other.
     pub all: Vec<Case>,
-    /// Requests of a few pixels and photons that reach all parts of its kernels: an interpreter of OpenCL watches each access to memory.
+    /// Requests of a few pixels and photons that reach all parts of its kernels. An interpreter of OpenCL checks their accesses to memory.
     pub tiny: Vec<Value>,
 }
 

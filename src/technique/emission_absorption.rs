@@ -1,13 +1,13 @@
 //! # `emission_absorption`
 //!
-//! Alpha-blended ray casting through a transfer function: each ray adds up what the volume emits on the way to the eye,
-//! less what is absorbed before it gets there:
+//! Alpha-blended ray casting through a transfer function. Each ray sums the volume's emission towards the eye, attenuated by the absorption on its
+//! way:
 //!
 //! I = Σ_k c_k α_k Π_{j<k} (1 − α_j),  α_k = 1 − exp(−σ_k Δs)   (Max, IEEE TVCG 1(2), 1995)
 //!
-//! σ is opacity per world unit, so the picture does not depend on the step Δs but for the error that is reported. Each
-//! pass starts its rays at another random place within the first step, so that banding becomes noise and averages out;
-//! each pass goes through another place within the pixels, so that edges are smooth.
+//! σ is opacity per world unit, so that the picture depends on the step Δs only by the error that is reported. Each pass starts its rays at another
+//! random place within the first step, so that banding becomes noise and averages out. Each pass goes through another place within the pixels, so
+//! that edges are smooth.
 //!
 //! | parameter | unit | range | default |
 //! |---|---|---|---|
@@ -74,15 +74,15 @@ device_struct! {
         pub table_scale: f32,
         /// See `table_scale`.
         pub table_offset: f32,
-        /// A ray ends when less than this gets through.
+        /// A ray ends if its transmittance is less than this.
         pub transmittance_floor: f32,
         /// Multiplies the picture.
         pub brightness: f32,
         /// Row of a two-dimensional table = gradient magnitude (raw values per world unit) × this; 0 for a table of values only.
         pub gradient_scale: f32,
-        /// Extinction is times the gradient magnitude times this; 0 for off.
+        /// The factor of extinction per gradient magnitude; 0 for off.
         pub gradient_gain: f32,
-        /// Extinction is times base + gain (1 − |n·v|)^exponent; a gain of 0 for off.
+        /// The factor of extinction is base + gain (1 − |n·v|)^exponent; a gain of 0 for off.
         pub silhouette_base: f32,
         /// See `silhouette_base`.
         pub silhouette_gain: f32,
@@ -102,7 +102,7 @@ device_struct! {
         pub cool: [f32; 3],
         /// Colour towards the light.
         pub warm: [f32; 3],
-        /// The part of the light that goes through a surface; 0 for off.
+        /// The part of the light that passes through a surface; 0 for off.
         pub translucency: f32,
         /// Exponent of its lobe.
         pub translucency_exponent: f32,

@@ -9,24 +9,24 @@ use crate::device::program::Variant;
 use crate::device::{Buffer, Device};
 use crate::error::Result;
 
-/// What an export makes.
+/// The file that an export makes.
 #[derive(Debug, Clone)]
 pub struct File {
     /// Its bytes.
     pub bytes: bytes::Bytes,
     /// Its media type.
     pub media_type: &'static str,
-    /// The extension of its name.
+    /// The file name's extension.
     pub extension: &'static str,
-    /// What stands under `result` in the reply.
+    /// The reply's `result`.
     pub result: Value,
 }
 
-/// What an export looks at, once all of it is there.
+/// The complete subject of an export on the device.
 pub struct OnDevice {
-    /// It has no field any more.
+    /// The subject, which has no field any more.
     pub subject: Subject,
-    /// The voxels of its volume, where it has one: a buffer, or an image where the device samples volumes as images.
+    /// The voxels of its volume, if it has one: a buffer, or an image if the device samples volumes as images.
     pub voxels: Option<Rc<Buffer>>,
 }
 
@@ -35,12 +35,12 @@ pub trait Export: Send + Sync {
     /// The kernel variants that its process runs on a subject without a field.
     ///
     /// # Errors
-    /// `Error::Invalid` where parameters and subject do not go together; [`crate::error::Error::Internal`] for a combination of features that
-    /// is not listed.
+    /// `Error::Invalid` if parameters and subject do not go together; [`crate::error::Error::Internal`] for a combination of features that is not
+    /// listed.
     fn kernels(&self, subject: &Subject) -> Result<Vec<Variant>>;
     /// Begins its process on a device that has its kernels.
     ///
     /// # Errors
-    /// [`crate::error::Error::Internal`] when the device has no room.
+    /// [`crate::error::Error::Internal`] if the device has no room.
     fn begin(&self, device: &mut Device, seen: OnDevice) -> Result<Box<dyn Process<Look = File>>>;
 }

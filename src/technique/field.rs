@@ -1,7 +1,7 @@
 //! Fields: techniques that fill a grid, step by step.
 //!
-//! A [`Field`] is a valid request. On the device's thread it begins a [`Process`], which looks after its own buffers. What it counts (photons,
-//! iterations, views) is its own business.
+//! A [`Field`] is a valid request. On the device's thread it begins a [`Process`], which owns its buffers. Each field chooses the unit that it counts
+//! (photons, iterations, views).
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use crate::volume::Volume;
 pub struct Look {
     /// The grid.
     pub volume: Arc<Volume>,
-    /// What stands under `result` in the reply.
+    /// The reply's `result`.
     pub result: Value,
 }
 
@@ -26,18 +26,18 @@ pub struct Look {
 pub trait Field: Send + Sync {
     /// The box of its grid.
     fn bounds(&self) -> Bounds;
-    /// The kernel variants that its process runs: they are compiled before it begins.
+    /// The kernel variants that its process runs. They are compiled before it begins.
     ///
     /// # Errors
     /// [`crate::error::Error::Internal`] for a combination of features that is not listed.
     fn kernels(&self) -> Result<Vec<Variant>>;
-    /// Why it is done so, in words.
+    /// The reasons for the chosen method, in words.
     fn reasons(&self) -> Vec<String>;
-    /// The same with another amount of work, and with another seed: its own with bits of `seed` flipped.
+    /// The same field with another amount of work, and with its own seed xor `seed`.
     fn with(&self, work: u64, seed: u64) -> Arc<dyn Field>;
     /// Begins its process on a device that has its kernels.
     ///
     /// # Errors
-    /// [`crate::error::Error::Internal`] when the device has no room.
+    /// [`crate::error::Error::Internal`] if the device has no room.
     fn begin(&self, device: &mut Device) -> Result<Box<dyn Process<Look = Look>>>;
 }

@@ -1,10 +1,10 @@
 //! # `histogram`
 //!
-//! How many voxels have which value, as a table. Read from the right it is the dose–volume histogram of radiotherapy (Drzymala et al.,
-//! International Journal of Radiation Oncology 21(1), 1991): the part of the volume that has at least a value.
+//! The number of voxels per value, as a table. Read from the right it is the dose–volume histogram of radiotherapy (Drzymala et al., International
+//! Journal of Radiation Oncology 21(1), 1991): the part of the volume that has at least a value.
 //!
-//! The range is divided into equal bins. A voxel's bin is found in single precision, so a value within rounding of an edge may be counted on
-//! either side; the highest value belongs to the last bin. Voxels below or above the range, and those that are no number, are counted apart.
+//! The range is divided into equal bins. A voxel's bin is found in single precision, so a value within rounding of an edge may be counted on either
+//! side; the highest value belongs to the last bin. Voxels below or above the range, and NaN voxels, are counted apart.
 //!
 //! | parameter | unit | range | default |
 //! |---|---|---|---|
@@ -60,7 +60,7 @@ device_struct! {
         pub bins: i32,
         /// The raw value where bin 0 begins.
         pub low: f32,
-        /// Bins per raw value; below 0 where values fall as raw ones rise.
+        /// Bins per raw value; below 0 if values fall as raw ones rise.
         pub per_raw: f32,
     }
 }
@@ -120,8 +120,8 @@ fn parse(parameters: &Value, at: &str, _: &Assets) -> Result<Arc<dyn Export>> {
 }
 
 impl Parameters {
-    /// The values where the first bin begins and the last one ends: where all voxels have one value, that is in the middle of a range as wide
-    /// as the value, or 1.
+    /// The values where the first bin begins and the last one ends. If all voxels have one value, the range is around it, as wide as its magnitude,
+    /// or 1 for 0.
     fn range_of(&self, volume: &Volume) -> [f64; 2] {
         let [low, high] = self.range.unwrap_or(volume.range());
         let half = if low == high { (0.5 * low.abs()).max(if low == 0.0 { 0.5 } else { 0.0 }) } else { 0.0 };

@@ -1,11 +1,11 @@
 //! # `isosurface`
 //!
-//! The surfaces on which the volume has given values, where the rays first meet them.
+//! The surfaces on which the volume has given values, at their first crossings with the rays.
 //!
-//! A ray looks at the value at the ends of its steps; where the isovalue lies between the two, the crossing is refined by regula
-//! falsi in the Illinois form (Dowell & Jarratt, BIT 11, 1971) to a ten-thousandth of a voxel. No surface is missed around
-//! anything that is thicker than a step. Macro-cells whose values are all on one side cost nothing.
-//! Where a GPU reads volumes as images, its sampler's weights have 8 fractional bits, and so has the crossing (`/v1/device` says which).
+//! The value is sampled at the ends of a ray's steps. If the isovalue lies between the two, the crossing is refined by regula falsi in the Illinois
+//! form (Dowell & Jarratt, BIT 11, 1971) to a ten-thousandth of a voxel. No surface is missed around anything that is thicker than a step.
+//! Macro-cells whose values are all on one side cost nothing. If a GPU reads volumes as images, its sampler's weights have 8 fractional bits, and so
+//! has the crossing (`/v1/device` tells).
 //! The surface's normal is the gradient there, lit from both sides by Lambert's law and Blinn-Phong.
 //!
 //! | parameter | unit | range | default |
@@ -58,7 +58,7 @@ pub const TECHNIQUE: Technique = Technique {
 device_struct! {
     /// The kernel's own parameters.
     pub struct Isosurface {
-        /// −1 where values fall as raw values rise, else 1.
+        /// −1 if values fall as raw values rise, else 1.
         pub sign: f32,
         /// The number of surfaces.
         pub surfaces: i32,
@@ -68,15 +68,15 @@ device_struct! {
         pub color: [f32; 3 * MOST_SURFACES],
         /// Opacities.
         pub opacity: [f32; MOST_SURFACES],
-        /// A ray ends when less than this gets through.
+        /// A ray ends if its transmittance is less than this.
         pub transmittance_floor: f32,
-        /// Width at which a bracket of a crossing is narrow enough, world units.
+        /// The width at which the bracket of a crossing is narrow enough, world units.
         pub tolerance: f32,
         /// 1 if the normal is the interpolant's own gradient.
         pub analytic: i32,
         /// 1 if the distance from the eye goes to the film instead of a colour.
         pub depth: i32,
-        /// Rays that look for what hides the sky; 0 for none.
+        /// The number of ambient occlusion rays; 0 for none.
         pub occlusion_rays: i32,
         /// Their length, world units.
         pub occlusion_radius: f32,

@@ -12,9 +12,9 @@ device_enum! {
         Exact,
         /// In steps of one length.
         March,
-        /// By Woodcock's method, with majorants.
+        /// Woodcock's method, with majorants.
         Delta,
-        /// By the same with weights, for majorants that may be too small.
+        /// The same with weights, for majorants that may be too small.
         Weighted,
     }
 }
@@ -49,7 +49,7 @@ impl Default for Majorant {
     }
 }
 
-/// By what part the mean free path of a march is too long whose step has the optical depth h: h / (1 − exp(−h)) − 1.
+/// The relative excess of the mean free path of a march whose step has the optical depth h: h / (1 − exp(−h)) − 1.
 pub fn march_bias(depth: f64) -> f64 {
     if depth > 0.0 { depth / -(-depth).exp_m1() - 1.0 } else { 0.0 }
 }

@@ -65,14 +65,14 @@ impl DeviceEnum for Interpolation {
     }
 }
 
-/// The names that all views' kernels share: of interpolations and counts.
+/// The `#define`s that all views' kernels share: interpolations and counts.
 pub fn view_words() -> String {
     Interpolation::opencl_text() + &Count::opencl_text()
 }
 
 /// The description of a technique.
 pub struct Technique {
-    /// Its name: of its Rust file, its kernel, its test, and in a request.
+    /// The name of its Rust file, its kernel and its test, and its name in a request.
     pub name: &'static str,
     /// Its purpose, in a sentence.
     pub summary: &'static str,
@@ -82,9 +82,9 @@ pub struct Technique {
     pub example: fn() -> Value,
     /// Its kernel and the variants of it.
     pub source: fn() -> Source,
-    /// Sections of the request that it shares with other techniques, in place of its own parameters of those names.
+    /// The sections of the request that it shares with other techniques, in place of its own parameters of those names.
     pub shares: &'static [&'static str],
-    /// What tests run of it.
+    /// The cases that tests run.
     pub cases: fn() -> Cases,
     /// Its kind, with its parser: parameters and their JSON pointer.
     pub kind: Kind,
@@ -95,37 +95,37 @@ pub struct Technique {
 pub enum Kind {
     /// Turns a camera into an image.
     View {
-        /// Makes the view; its parameters may name what is stored.
+        /// Makes the view; its parameters may name stored objects.
         parse: fn(&Value, &str, &Assets) -> Result<Arc<dyn View>>,
-        /// The technique that leaves nothing of the scene out, of which this is one setting: itself, as a rule.
+        /// The technique that leaves nothing of the scene out and has this one as a setting: usually itself.
         complete: &'static str,
-        /// A scene by which its speed on a device is measured for the planner; where it has none, the first technique's speed stands for it.
+        /// A scene that measures its speed on a device for the planner; without one, the first technique's speed stands for it.
         calibration: Option<fn() -> Value>,
     },
     /// Fills a grid.
     Field {
-        /// Makes the field; its parameters may name what is stored.
+        /// Makes the field; its parameters may name stored objects.
         parse: fn(&Value, &str, &Assets) -> Result<Arc<dyn Field>>,
-        /// How much of it there may be.
+        /// The parameter that sets its amount of work.
         work: Work,
     },
     /// Turns a subject into a file.
     Export {
-        /// Makes the export; its parameters may name what is stored.
+        /// Makes the export; its parameters may name stored objects.
         parse: fn(&Value, &str, &Assets) -> Result<Arc<dyn Export>>,
     },
 }
 
-/// The parameter of a field that says how much it works.
+/// The parameter of a field that sets its amount of work.
 #[derive(Clone, Copy)]
 pub struct Work {
-    /// Its name, which is also the name of what is counted.
+    /// Its name, which is also the name of the counted unit.
     pub of: &'static str,
     /// The most that a server permits.
     pub most: fn(&Limits) -> u64,
-    /// As much as tells how fast the field is.
+    /// The amount of work that is enough to measure the field's speed.
     pub first: u64,
-    /// How many looks are due while it works, besides the last.
+    /// The number of looks that are due during the work, besides the last.
     pub looks: u32,
 }
 
@@ -148,18 +148,18 @@ impl Technique {
     }
 }
 
-/// The built-in smoke: what the planner measures a device by.
+/// The built-in smoke, by which the planner measures a device.
 pub(crate) fn smoke() -> Value {
     serde_json::json!({"volume": {"builtin": "smoke", "resolution": 64}})
 }
 
 static ADDED: OnceLock<&'static [Technique]> = OnceLock::new();
 
-/// Adds techniques of the program that this library is part of to the list, once, before a service is started. Their kernel files are read
-/// from the folder of [`crate::device::DeviceConfig::kernels`].
+/// Adds techniques to the list, once, before a service is started: those of the program that contains this library. Their kernel files are read from
+/// the folder of [`crate::device::DeviceConfig::kernels`].
 ///
 /// # Errors
-/// [`Error::Conflict`] where that was done already, or a name is taken.
+/// [`Error::Conflict`] if techniques were added before, or a name is taken.
 pub fn add(techniques: &'static [Technique]) -> Result<()> {
     if let Some(taken) = techniques.iter().find(|t| ALL.iter().any(|known| known.name == t.name)) {
         return Err(Error::Conflict(format!("there is a technique {} already", taken.name)));
@@ -167,7 +167,7 @@ pub fn add(techniques: &'static [Technique]) -> Result<()> {
     ADDED.set(techniques).map_err(|_| Error::Conflict("techniques were added already".into()))
 }
 
-/// Every technique that is served: [`ALL`], and those that were added.
+/// Every technique that is served: [`ALL`] and the added ones.
 pub fn all() -> impl Iterator<Item = &'static Technique> {
     ALL.iter().chain(ADDED.get().copied().unwrap_or_default())
 }

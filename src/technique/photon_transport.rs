@@ -1,14 +1,13 @@
 //! # `photon_transport`
 //!
-//! Photons through participating media: a free path ends where its optical depth reaches −ln u, a collision absorbs the part
-//! 1 − albedo of the weight and scatters the rest by the medium's phase function, an interface reflects by Fresnel's formulae or
-//! refracts, and Russian roulette ends photons that no longer matter without changing any mean (an energy cut-off would lose what
-//! it cuts). Without media it is the lecture's `chamber`.
+//! Photons through participating media. A free path ends at the optical depth −ln u. A collision absorbs the part 1 − albedo of the weight and
+//! scatters the rest by the medium's phase function. An interface reflects by Fresnel's formulae or refracts. Russian roulette ends photons of small
+//! weight without changing any mean (an energy cut-off would lose their energy). Without media the scene is the lecture's `chamber`.
 //!
-//! The grid is, per launched photon, the fluence Φ = Σ w s / ΔV (track length) or Σ w / (σ ΔV) (collision) per mm², the energy
-//! absorbed per mm³, or the lecture's gather L = (1/σ) Σ w P(ω, ω_eye) / ΔV per mm² and steradian: each event is scored towards the
-//! eye as it happens, which costs a phase function a collision, and another eye is another simulation. Deposits are 64-bit integers
-//! and random numbers are keyed by photon and event, so the same request gives the same bytes on any number of threads.
+//! The grid is, per launched photon, the fluence Φ = Σ w s / ΔV (track length) or Σ w / (σ ΔV) (collision) per mm², the energy absorbed per mm³, or
+//! the lecture's gather L = (1/σ) Σ w P(ω, ω_eye) / ΔV per mm² and steradian. The gather scores each event towards the eye as it happens: this costs
+//! a phase function per collision, and another eye needs another simulation. Deposits are 64-bit integers and random numbers are keyed by photon and
+//! event, so the same request gives the same bytes on any number of threads.
 //!
 //! | parameter | unit | range | default |
 //! |---|---|---|---|
@@ -26,7 +25,7 @@
 //! | `march_step_mm` | mm | | a tenth of the shortest mean free path |
 //! | `majorant` | | `local` or `global`, times a scale | local, 1 |
 //! | `tally` | | `fluence`, `absorbed`, `radiance_gather` | `fluence` |
-//! | `estimator` | | `track_length`, `collision` | what the scene permits |
+//! | `estimator` | | `track_length`, `collision` | the scene decides |
 //! | `eye_mm` | mm from the box's corner | for the gather | before the entry face |
 //! | `exit_histogram` | mm, degrees | edges of radius and angle | |
 //! | `roulette` | | threshold 0–1, survival 0–1 | 10⁻⁴, 0.1 |
@@ -126,7 +125,7 @@ fn source() -> Source {
 struct Simulation {
     parameters: Parameters,
     geometry: Geometry,
-    /// Least and greatest anywhere: looked for once, for a grid has many voxels.
+    /// The least and greatest extinction anywhere. They are computed once, since a grid has many voxels.
     extinction_range_per_mm: [f64; 2],
     source: source::Source,
     tracking: Tracking,
@@ -134,7 +133,7 @@ struct Simulation {
     /// True if deposits are by track length.
     track: bool,
     reasons: Vec<String>,
-    /// The plan, made with the request: of a large grid that takes a while, and the device's thread has other jobs. The first process takes it.
+    /// The plan, made with the request: for a large grid this takes a while, and the device's thread has other jobs. The first process takes it.
     plan: Arc<Mutex<Option<DevicePlan>>>,
 }
 
@@ -236,13 +235,13 @@ impl Field for Arc<Simulation> {
 }
 
 impl Simulation {
-    /// The plan that was made with the request, or another.
+    /// The plan that was made with the request, or a new one.
     fn take_plan(&self) -> Result<DevicePlan> {
         let made = self.plan.lock().unwrap_or_else(PoisonError::into_inner).take();
         made.map_or_else(|| self.device_plan(), Ok)
     }
 
-    /// The grid after so many photons, per photon, from its sums.
+    /// The grid per photon, from the sums of `photons` photons.
     fn grid(&self, sums: &[u64], photons: u64) -> NewVolume {
         let [sx, sy, sz] = self.spacing_mm();
         let scale = 1.0 / (self.deposit_scale() * FIXED_ONE * photons as f64 * sx * sy * sz);

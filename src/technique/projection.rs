@@ -12,10 +12,10 @@
 //! The integrals are exact for the interpolant, to rounding: between the planes at which it changes its polynomial it is
 //! integrated by Gauss-Legendre with as many points as its degree asks for, and for `nearest` voxel by voxel (Siddon, Medical
 //! Physics 12(2), 1985). σ is not clamped at 0, so that this holds: values below `zero_value` count as negative extinction.
-//! The greatest and least value are exact where `exact` is set. Otherwise they are taken at samples `step_voxels` apart, always at
-//! the middle of a step: the mean of several jittered maxima would lie below the maximum. Then parts of a beam that cannot show
-//! more than was seen are left out, those with the greatest bound are looked at first, and the error is that of the step.
-//! NaN voxels are empty. Rays past the volume are transparent; of an X-ray, all the light gets through.
+//! The greatest and least value are exact if `exact` is set. Otherwise they are taken at samples `step_voxels` apart, always at the middle of a step:
+//! the mean of several jittered maxima would lie below the maximum. Parts of a beam that cannot exceed the value found so far are skipped, those with
+//! the greatest bound are sampled first, and the error is that of the step. NaN voxels are empty. Rays past the volume are transparent; in an X-ray
+//! they have a transmittance of 1.
 //!
 //! | parameter | unit | range | default |
 //! |---|---|---|---|
@@ -66,7 +66,7 @@ device_struct! {
     pub struct Projection {
         /// A [`DeviceMode`].
         pub mode: i32,
-        /// 1 to look for the greatest raw value, −1 for the least.
+        /// 1 to search for the greatest raw value, −1 for the least.
         pub sign: f32,
         /// value = raw × slope + inter.
         pub slope: f32,
@@ -82,7 +82,7 @@ device_struct! {
         pub window_offset: f32,
         /// 1 if values go to the film instead of colours.
         pub raw_values: i32,
-        /// 1 if the cells' ranges are looked at.
+        /// 1 if the cells' ranges are used to skip.
         pub skipping: i32,
     }
 }

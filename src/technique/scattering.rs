@@ -17,7 +17,7 @@ pub(super) use parameters::Parameters;
 pub(super) use plan::Scatterer;
 pub(super) use settings::NOT_OF_ONCE;
 
-/// The schema of the parameters without those that are not a technique's own, and without phase functions that are not of light.
+/// The schema of the parameters without the fields `without`, and without phase functions that are not for light.
 pub(super) fn schema(without: &[&str]) -> &'static Value {
     request::kept(&format!("scattering without {without:?}"), || make_schema(without))
 }

@@ -1,10 +1,10 @@
 //! # `single_scatter`
 //!
-//! What comes straight to the eye, and what is scattered once on its way, with shadows cast through the volume: the first two terms of
-//! the radiative transfer equation's series, L = T L_sky + ∫ T σ [ε/σ + albedo Σ p(ω', ω) T' L_light] dt (Blinn, SIGGRAPH 1982;
-//! Kajiya & Von Herzen, SIGGRAPH 1984). Where a collision is by delta tracking, the way to every light by ratio tracking, and points,
-//! spheres and quads are also seen from places chosen by angle (Kulla & Fajardo, EGSR 2012). It is `volume_path` with
-//! `max_scatterings` 1, with less noise near lights. What it leaves out grows with albedo and depth.
+//! Light that reaches the eye directly or after one scattering, with shadows cast through the volume: the first two terms of the radiative transfer
+//! equation's series, L = T L_sky + ∫ T σ [ε/σ + albedo Σ p(ω', ω) T' L_light] dt (Blinn, SIGGRAPH 1982; Kajiya & Von Herzen, SIGGRAPH 1984).
+//! Collisions are found by delta tracking, transmittances to every light by ratio tracking, and points, spheres and quads are also seen from places
+//! chosen by angle (Kulla & Fajardo, EGSR 2012). It is `volume_path` with `max_scatterings` 1, with less noise near lights. The part of the light
+//! that it leaves out grows with albedo and depth.
 //!
 //! | parameter | unit | range | default |
 //! |---|---|---|---|
@@ -63,7 +63,7 @@ fn cases() -> Cases {
     let own = json!({"tracking": "exact", "medium": {"sigma_t_per_unit": 2},
         "lights": [{"type": "sun"}, {"type": "point", "position": [0, 0.5, 0]}, {"type": "sky"}]});
     let mut request = tiny(TECHNIQUE.name, "sphere", 10, 2, &own);
-    // More than a tile.
+    // The picture is wider than a tile.
     request["image"]["width"] = json!(17);
     scattering::cases(vec![request])
 }

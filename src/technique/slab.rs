@@ -1,13 +1,13 @@
-//! A slab that scatters evenly, of one optical depth and without sides: Chandrasekhar's problem, by integral equation. How much of what
-//! it sends back was scattered more than so often says where a technique that stops there is not enough.
+//! A slab that scatters isotropically, of one optical depth and without sides: Chandrasekhar's problem, by integral equation. The part of the
+//! reflected light that was scattered more than n times tells if a technique that stops after n scatterings is enough.
 
-/// Neumann's series ends here at the latest.
+/// The most terms of Neumann's series.
 const MOST_TERMS: u32 = 10_000;
-/// Of [`missing`]: cells, and the optical depth that stands for deeper ones.
+/// [`missing`]'s number of cells, its relative change at the end, and the optical depth that stands for deeper slabs.
 const COARSE_CELLS: usize = 64;
 const COARSE_CHANGE: f64 = 1e-5;
 const DEEPEST: f64 = 12.0;
-/// Of less nothing is missed that matters, and differences of E₃ lose their digits.
+/// The depth below which [`missing`] is 0: the missing part does not matter there, and differences of E₃ lose their digits.
 const THINNEST: f64 = 1e-6;
 
 /// The exponential integral E₂(x) = ∫₁^∞ e^(−xt)/t² dt, x ≥ 0: Gauss-Legendre over u = 1/t of e^(−x/u), in pieces towards 0.
@@ -78,12 +78,12 @@ fn solve(depth: f64, albedo: f64, scatterings: Option<u32>, cells: usize, change
     }
 }
 
-/// The part of a slab's reflectance that was scattered more than `scatterings` times, to a few thousandths.
+/// The part of a slab's reflectance that was scattered more than `scatterings` times, to within a few thousandths.
 pub fn missing(depth: f64, albedo: f64, scatterings: u32) -> f64 {
     if depth < THINNEST || albedo <= 0.0 {
         return 0.0;
     }
-    // Deeper ones hardly differ: what comes back has hardly been there.
+    // Deeper slabs hardly differ, since reflected light does not come from so deep.
     let depth = depth.min(DEEPEST);
     let of = |scatterings| solve(depth, albedo.min(1.0), scatterings, COARSE_CELLS, COARSE_CHANGE).reflectance;
     (1.0 - of(Some(scatterings)) / of(None)).max(0.0)
@@ -95,7 +95,7 @@ mod tests {
 
     #[test]
     fn single_scattering_is_wrong_by_what_the_table_says() {
-        // VALIDATION.md, of discrete ordinates, in percent.
+        // The table of discrete ordinates in VALIDATION.md, in percent.
         for (albedo, depth, percent, within) in [
             (0.1, 0.1, -1.6, 0.06),
             (0.1, 1.0, -5.6, 0.06),

@@ -4,9 +4,9 @@
 //! the plane's normal. The camera sees the plane where it is in the volume; beside it the picture is transparent. An
 //! orthographic camera that looks along the normal shows it undistorted.
 //!
-//! The mean over the slab is exact for the interpolant, as are its greatest and least value for `nearest` and `trilinear`
-//! (see `kernels/shared/walk.h`); for the splines they are those of five points between two planes of voxels. What of the slab is
-//! outside of the volume does not count. NaN voxels are empty. Nothing depends on a step.
+//! The mean over the slab is exact for the interpolant, as are its greatest and least value for `nearest` and `trilinear` (see
+//! `kernels/shared/walk.h`); for the splines they are those of five points between two planes of voxels. The part of the slab outside the volume does
+//! not count. NaN voxels are empty. Nothing depends on a step.
 //!
 //! | parameter | unit | range | default |
 //! |---|---|---|---|
@@ -63,9 +63,9 @@ device_struct! {
         pub normal_index: [f32; 3],
         /// Half the slab, world units.
         pub half_thickness: f32,
-        /// 1 if the slab shows its greatest or least value, not its mean.
+        /// 1 if the slab shows its greatest or least value instead of its mean.
         pub peaks: i32,
-        /// 1 to look for the greatest raw value, −1 for the least.
+        /// 1 to search for the greatest raw value, −1 for the least.
         pub sign: f32,
         /// value = raw × slope + inter.
         pub slope: f32,

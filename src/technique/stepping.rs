@@ -1,4 +1,4 @@
-//! What the planner may choose of views that sample along their rays: steps, and levels of the volume.
+//! The planner's choices for views that sample along their rays: steps, and levels of the volume.
 
 use std::sync::Arc;
 
@@ -6,31 +6,31 @@ use serde_json::{Value, json};
 
 use super::view::{Open, Setting, Settings, View};
 
-/// Steps that are tried, sides of the smallest voxel, and that of the reference.
+/// The steps that are tried, in sides of the smallest voxel, and the reference's step.
 const STEPS: [f64; 4] = [0.25, 0.5, 1.0, 2.0];
 const SHORTEST: f64 = 0.125;
-/// Those that are tried at a coarser level, sides of its smallest voxel.
+/// The steps that are tried at a coarser level, in sides of its smallest voxel.
 const COARSER_STEPS: [f64; 2] = [1.0, 2.0];
 
-/// A way to make the picture besides its step.
+/// A way to make the picture, apart from its step.
 pub(super) struct Way<P> {
-    /// What is said of it behind the step.
+    /// Its description, which follows the step's.
     pub words: &'static str,
-    /// The parameter that it changes, as a request has it.
+    /// The parameter that it changes, in the form of a request.
     pub change: Option<(&'static str, Value)>,
     /// The parameters.
     pub parameters: P,
 }
 
 impl<P: Clone> Way<P> {
-    /// The parameters as they are given.
+    /// The request's own parameters.
     pub fn as_given(parameters: &P) -> Self {
         Self { words: "", change: None, parameters: parameters.clone() }
     }
 }
 
-/// The settings of a view that samples along its rays: steps, at the volume's levels, in each of some `ways`. `with_step` gives a way's
-/// parameters a step in sides of the smallest voxel. None where the request gives the step.
+/// The settings of a view that samples along its rays: steps, at the volume's levels, in each of some `ways`. `with_step` gives a way's parameters a
+/// step in sides of the smallest voxel. `None` if the request gives the step.
 pub(super) fn stepping<P>(
     technique: &'static str,
     open: &Open<'_>,
@@ -49,7 +49,7 @@ pub(super) fn stepping<P>(
     for Way { words: way, change, parameters } in ways {
         let mut finer: Option<String> = None;
         for (level, steps) in &levels {
-            // What the next finer level leaves out with its shortest step, this one does.
+            // All that the next finer level leaves out with its shortest step is left out here as well.
             let (mut less, first) = (finer, all.len());
             for &step in *steps {
                 let of_level = level.map_or(String::new(), |l| format!(" of level {l}"));

@@ -2,11 +2,11 @@
 
 use serde_json::{Value, json};
 
-/// A grid holds no period shorter than two voxels.
+/// The longest step without a warning: a grid holds no period shorter than two voxels.
 const LONGEST_VOXELS: f64 = 2.0;
 
-/// A word of warning where steps are so long that they may pass over what is in the grid. An error that is told from what other
-/// samples found knows nothing of what all of them missed.
+/// A warning if steps are so long that they may miss details of the grid. An error that is estimated from samples does not include details that
+/// all samples missed.
 pub(super) fn coarse_step(step_voxels: f64) -> Option<Value> {
     let message =
         "steps of more than two voxels may pass over what lies between them, and the stated error knows nothing of it";

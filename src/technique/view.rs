@@ -13,7 +13,7 @@ use crate::scene::bounds::Bounds;
 use crate::scene::camera::Camera;
 use crate::volume::Volume;
 
-/// Pixels along a side of a tile, by which stochastic views are sampled (`kernels/shared/tile.h`).
+/// Pixels along a side of a tile. Stochastic views are sampled by tiles (`kernels/shared/tile.h`).
 pub(crate) const TILE: usize = 16;
 /// Words before the list of tiles.
 pub(crate) const TILES_HEADER: usize = 3;
@@ -21,7 +21,7 @@ pub(crate) const TILES_HEADER: usize = 3;
 /// The macro-cells' part in a view (`kernels/cells.cl`).
 #[derive(Debug, Clone, PartialEq)]
 pub enum CellUse {
-    /// The distance of each cell to the nearest one with a value in these intervals, a byte a cell: empty cells are skipped.
+    /// The distance of each cell to the nearest one with a value in these intervals, a byte per cell. Empty cells are skipped.
     Distances(Vec<[f64; 2]>),
     /// The least and greatest voxel that a sample in each cell can read, in the volume's own type.
     Ranges,
@@ -38,40 +38,39 @@ pub struct ViewPlan {
     pub cells: CellUse,
     /// The step of the finest pass, world units.
     pub step: f32,
-    /// Words of a lane, for each packet of a work-item, that a launch leaves to the next (`kernels/shared/resume.h`); 0 where no launch can take
-    /// long.
+    /// Words of a lane, for each packet of a work-item, that a launch leaves to the next (`kernels/shared/resume.h`); 0 if no launch can take long.
     pub state_words: usize,
-    /// True if the step plays no part in the picture.
+    /// True if the step has no effect on the picture.
     pub stepless: bool,
-    /// Past this opacity a ray ends; what it leaves out is part of the error.
+    /// The opacity at which a ray ends. The light behind is part of the error.
     pub opacity_threshold: f64,
-    /// Why it is planned so, in words.
+    /// The reasons for the plan, in words.
     pub reasons: Vec<String>,
 }
 
 /// The sampling scheme of a stochastic view: by tiles (`kernels/shared/tile.h`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Random {
-    /// True if more samples are taken where the noise is.
+    /// True if noisier parts get more samples.
     pub adaptive: bool,
-    /// The luminance that brighter ones are scaled down to.
+    /// The luminance that brighter samples are scaled down to.
     pub clamp_luminance: Option<f64>,
 }
 
 impl Random {
-    /// Samples per pixel before which the error of random samples is not believed: no render stops for it, and none is placed by it.
+    /// Samples per pixel below which the error of random samples is not relied on: no render stops by it, and no samples are placed by it.
     pub const LEAST_SAMPLES: u32 = 16;
 }
 
 /// A view with valid parameters.
 pub trait View: Send + Sync {
-    /// The view of a subject: all that does not depend on the camera is worked out, once. It may take a while, as where floats are taken as
-    /// words.
+    /// The view of a subject. Everything that does not depend on the camera is computed once. This may take a while, for example to convert
+    /// floats to words.
     ///
     /// # Errors
-    /// `Error::Invalid` where parameters and subject do not go together.
+    /// `Error::Invalid` if parameters and subject do not go together.
     fn prepare(&self, subject: &Subject) -> Result<Arc<dyn PreparedView>>;
-    /// The box of what the view shows by its own parameters, where it does: it may look at that alone. A view without one looks at a volume.
+    /// The box of the objects in the view's own parameters, if any; such a view needs no volume. A view without a box looks at a volume.
     fn bounds(&self) -> Option<Bounds> {
         None
     }
@@ -79,7 +78,7 @@ pub trait View: Send + Sync {
     fn clips(&self) -> bool {
         true
     }
-    /// True if values are labels, of which there is no mean.
+    /// True if values are labels, which have no mean.
     fn shows_labels(&self) -> bool {
         false
     }
@@ -93,7 +92,7 @@ pub trait View: Send + Sync {
 pub trait PreparedView: Send + Sync {
     /// Its plan.
     fn plan(&self) -> &ViewPlan;
-    /// The volume that its kernel reads: the subject's, or that in words. None where it looks at none.
+    /// The volume that its kernel reads: the subject's, or the same in words. `None` if it reads none.
     fn volume(&self) -> Option<&Arc<Volume>>;
     /// The kernel's own parameters for a camera, as the bytes of its device struct.
     fn parameters(&self, camera: &Camera) -> Vec<u8>;
@@ -103,15 +102,15 @@ pub trait PreparedView: Send + Sync {
     }
     /// Sets fields that all views share, such as its lights.
     fn set_shared(&self, _camera: &Camera, _view: &mut DeviceView) {}
-    /// The settings that the planner may choose in its place; `None` where there is nothing to choose.
+    /// The settings that the planner may choose in its place; `None` if there is no choice.
     fn settings(&self, _open: &Open<'_>) -> Option<Settings> {
         None
     }
-    /// The optics of the scene, where it scatters light.
+    /// The optics of the scene, if it scatters light.
     fn optics(&self) -> Option<Optics> {
         None
     }
-    /// The greatest change of opacity per unit of length with the value, where a transfer function gives it.
+    /// The greatest change of opacity per unit of length with the value, if a transfer function gives it.
     fn steepest_slope(&self) -> Option<f64> {
         None
     }
@@ -121,8 +120,8 @@ pub trait PreparedView: Send + Sync {
     }
 }
 
-/// The volume in words of 16 bits where it has floats and a difference of `resolution` between values plays no part in the picture, with what
-/// that does to values, in words; else the volume as it is.
+/// The volume in words of 16 bits, with the effect on its values in words: if it has floats and a difference of `resolution` between values has no
+/// effect on the picture. Otherwise the volume as it is.
 pub(super) fn in_words(volume: &Arc<Volume>, resolution: Option<f64>) -> (Arc<Volume>, Option<String>) {
     match resolution.and_then(|resolution| volume.words(resolution)) {
         Some(words) => {
@@ -133,15 +132,15 @@ pub(super) fn in_words(volume: &Arc<Volume>, resolution: Option<f64>) -> (Arc<Vo
     }
 }
 
-/// What a request leaves open.
+/// The choices that a request leaves open.
 pub struct Open<'a> {
     /// The view's own parameters as the request has them.
     pub given: &'a Map<String, Value>,
     /// True if the request leaves the technique to the planner.
     pub auto: bool,
-    /// Coarser levels of the volume that may stand for it.
+    /// Coarser levels of the volume that may replace it.
     pub levels: Vec<usize>,
-    /// The error asked for, relative.
+    /// The relative error that the request asks for.
     pub error: f64,
 }
 
@@ -157,35 +156,35 @@ impl Open<'_> {
 pub struct Setting {
     /// The technique.
     pub technique: &'static str,
-    /// The view with its parameters; none for that of the scene as it is.
+    /// The view with its parameters; `None` for the scene's own.
     pub view: Option<Arc<dyn View>>,
-    /// The parameters that are not as the request has them, as a request has them.
+    /// The parameters that differ from the request's, in the form of a request.
     pub changes: Vec<(&'static str, Value)>,
     /// The lights that are left out, by their places in the request.
     pub without_lights: Vec<usize>,
-    /// The level of the volume, where that is not its own.
+    /// The level of the volume, if it differs from the request's.
     pub level: Option<usize>,
-    /// What it is, in words.
+    /// A description, in words.
     pub words: String,
-    /// True if more samples take all of its error away.
+    /// True if its error falls to 0 with more samples.
     pub unbiased: bool,
-    /// The words of those that leave out less: where one of them leaves out too much, so does this.
+    /// The words of the settings that leave out less. If one of them leaves out too much, so does this one.
     pub less: Vec<String>,
 }
 
 impl Setting {
-    /// The view of the scene as it is, which stands for the truth.
+    /// The view of the scene as it is. It stands for the truth.
     pub fn as_given(technique: &'static str, words: String) -> Self {
         let (changes, without_lights, less) = (Vec::new(), Vec::new(), Vec::new());
         Self { technique, view: None, changes, without_lights, level: None, words, unbiased: true, less }
     }
 }
 
-/// The settings of a scene: the first is the reference, which stands for the truth of the others.
+/// The settings of a scene. The first is the reference, which stands for the truth of the others.
 #[derive(Default)]
 pub struct Settings {
-    /// Those that could do.
+    /// The possible settings.
     pub all: Vec<Setting>,
-    /// Those that a bound on what they leave out rules out, each with that bound, relative, and why.
+    /// The settings that are ruled out by a bound on their error, each with that relative bound and the reason.
     pub ruled_out: Vec<(Setting, f64, String)>,
 }

@@ -3,9 +3,9 @@
 //! The full radiative transfer equation by unbiased paths from the eye: the volume's values are densities, extinction
 //! σ(x) = density(x) · `sigma_t_per_unit`, and
 //! L(x, ω) = ∫ T(x, y) σ(y) [ε/σ + albedo ∫ p(ω', ω) L(y, ω') dω'] dy + T L_sky (Chandrasekhar, "Radiative Transfer", 1950).
-//! Free paths by delta tracking (Woodcock 1965), transmittances by ratio tracking (Novák, Selle, Jarosz 2014), next-event estimation
-//! towards one light a scattering, weighed against what the phase function finds by the balance heuristic (Veach & Guibas 1995); colours of
-//! different extinction by spectral tracking (Kutz et al. 2017).
+//! Free paths are found by delta tracking (Woodcock 1965), transmittances by ratio tracking (Novák, Selle, Jarosz 2014). Next-event estimation aims
+//! at one light per scattering; the balance heuristic weighs it against light that the phase function finds (Veach & Guibas 1995). Colours of
+//! different extinction are tracked by spectral tracking (Kutz et al. 2017).
 //!
 //! | parameter | unit | range | default |
 //! |---|---|---|---|
@@ -62,7 +62,7 @@ pub fn example() -> Value {
     })
 }
 
-/// Each kind of light, emission and colours; a surface that refracts: a homogeneous box.
+/// The cases cover each kind of light, emission and colours, and a surface that refracts: a homogeneous box.
 fn cases() -> Cases {
     let table = json!({"type": "tabulated", "cosines": [-1, 0, 1], "densities": [1, 0, 2]});
     let lights = json!([{"type": "sun"}, {"type": "sky"}, {"type": "point", "position": [0, 0, 0]},

@@ -1,5 +1,5 @@
-//! `docs/add-a-technique.md` done for real: a view that looks at no volume and a field with a host's decision between its launches. They are
-//! files of their own and one list line; nothing else of the service knows them.
+//! The code of `docs/add-a-technique.md` as a test: a view that looks at no volume, and a field with a decision of the host between its launches.
+//! They are files of their own and one list line; nothing else of the service knows them.
 
 mod ball;
 mod potential;
@@ -27,7 +27,7 @@ fn files() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/service/example"))
 }
 
-/// A folder with all kernels, and those of the examples.
+/// A folder with all kernels, including the examples'.
 fn kernels() -> &'static Path {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     FOLDER.get_or_init(|| {
@@ -75,7 +75,7 @@ fn a_view_without_a_volume_is_lit_as_its_closed_form_says() {
         for (i, pixel) in film.main.mean.chunks_exact(4).enumerate() {
             let [x, y] = [i % side, i / side].map(|p| 2.0 * (p as f64 + 0.5) / side as f64 - 1.0);
             let squared = 1.0 - x * x - y * y;
-            // At the silhouette rounding decides.
+            // At the silhouette rounding decides the result.
             if squared.abs() > 1e-3 {
                 let expected = 0.5 * squared.max(0.0).sqrt();
                 assert!((f64::from(pixel[0]) - expected).abs() < 1e-4, "at {x}, {y}: {} for {expected}", pixel[0]);
@@ -126,7 +126,7 @@ fn a_field_converges_to_its_closed_form_and_stops_when_the_host_says_so() {
 
 #[test]
 fn a_field_converges_as_fast_as_theory_says() {
-    // The slowest mode, sin(π z / n), shrinks by (4 + 2 cos(π / n)) / 6 an iteration.
+    // The slowest mode, sin(π z / n), shrinks by (4 + 2 cos(π / n)) / 6 per iteration.
     let n = 12.0;
     let rms = |iterations: u64| {
         potential(&json!({"grid": [3, 3, 12], "iterations": iterations})).1["rms_change"].as_f64().unwrap()
@@ -229,7 +229,7 @@ fn a_name_that_is_taken_is_refused() {
     assert!(matches!(taken, Err(Error::Conflict(_))));
 }
 
-/// All code of the page is that of the examples, but for white space; `…` stands for what is left out.
+/// The test finds all code of the page in the examples, except for white space; `…` stands for omitted code.
 #[test]
 fn the_pages_code_is_that_of_the_examples() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));

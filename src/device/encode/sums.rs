@@ -9,21 +9,21 @@ device_enum! {
     pub enum FilmSum: "SUM" {
         /// Luminance.
         Luminance,
-        /// The greatest luminance: squares are added up as parts of its square.
+        /// The greatest luminance. Squares are summed relative to its square.
         LuminanceScale,
-        /// Squares of what may be missing behind the ends of rays.
+        /// Squares of the light that may be missing behind the ends of rays.
         Truncated,
         /// Squared deviations of blocks of four pixels from their means.
         Blocks,
-        /// Squared differences of pixels to the mean of their neighbours.
+        /// Squared differences between pixels and the mean of their neighbours.
         Between,
-        /// How many such pixels.
+        /// The number of pixels in `Between`.
         PixelsBetween,
         /// The greatest squared standard error.
         NoiseScale,
         /// Squared standard errors of pixels.
         Noise,
-        /// Their squares.
+        /// Squares of `Noise`.
         NoiseSquares,
         /// Pixels of unknown error.
         Unknown,
@@ -35,18 +35,18 @@ device_enum! {
 }
 
 device_enum! {
-    /// Numbers that a work-item leaves of a row of the control, the first of as many as [`FilmSum`] has.
+    /// Numbers that a work-item leaves of a row of the control: the first of as many numbers as [`FilmSum`] has.
     pub enum ControlSum: "CONTROL" {
         /// The greatest difference to the film.
         DifferenceScale,
-        /// Squared differences, as parts of its square.
+        /// Squared differences, relative to its square.
         Difference,
         /// Variances of single samples.
         Variance,
     }
 }
 
-/// Numbers of a work-item.
+/// The numbers of a work-item.
 pub const SUMS: usize = FilmSum::LENGTH;
 
 /// The sums of a block of the film.

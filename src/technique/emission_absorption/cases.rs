@@ -1,4 +1,4 @@
-//! What tests run of `emission_absorption`.
+//! The cases that tests run of `emission_absorption`.
 
 use serde_json::json;
 

@@ -1,19 +1,19 @@
-//! The transfer function's table as a few polynomials, for those that are smooth but for some kinks, as most are.
+//! The transfer function's table as a few polynomials. Most functions are smooth except for some kinks.
 //!
-//! The values of 16 lanes in eight steps differ little as a rule, so that they lie on one piece or two: then a cubic for the opacity and a
-//! line for each colour, with coefficients that all lanes share, take the place of 128 looks into the table. A function that
-//! takes more than [`PIECES`] has none, and is looked up. Which it is depends on the function alone, and which piece on the value
-//! alone, so that a picture does not depend on what is sampled together.
+//! The values of 16 lanes in eight steps usually differ little, so that they lie on one piece or two. Then a cubic for the opacity and a line for
+//! each colour, with coefficients that all lanes share, replace 128 look-ups in the table. A function that needs more than [`PIECES`] has no pieces
+//! and is looked up. The choice depends on the function alone, and the piece on the value alone, so that a picture does not depend on the set of
+//! samples that share a register.
 
 use crate::scene::transfer::TABLE_SIZE;
 
-/// Most pieces: lanes of a register. `PIECES` of the kernel.
+/// The most pieces: the lanes of a register. `PIECES` of the kernel.
 pub const PIECES: usize = 16;
-/// An opacity may be off by this part of itself; then a picture is off by no more.
+/// The permitted relative error of an opacity. A picture has no greater error.
 const OPACITY_SLACK: f32 = 1.0 / 2048.0;
-/// An opacity may be off by this much besides, and by this part of the greatest, where it is next to nothing.
+/// The permitted absolute error of an opacity besides: the lesser of the first number, and of the second times the greatest opacity.
 const LEAST_SLACK: [f32; 2] = [1.0 / 262_144.0, 1.0 / 16_384.0];
-/// A colour may be off by this: an eighth of a level of 255.
+/// The permitted error of a colour: an eighth of a level of 255.
 const COLOUR_SLACK: f32 = 1.0 / 2048.0;
 
 #[derive(Clone, Copy)]
@@ -22,18 +22,18 @@ struct Entry {
     opacity: f32,
 }
 
-/// Polynomials in the entry's number less that of the first, the constant first.
+/// Polynomials in the entry's index relative to the first entry, the constant first.
 #[derive(Clone, Copy, Default)]
 struct Piece {
     first: usize,
-    /// The last entry up to which there is no opacity; before the first for none.
+    /// The last entry of the empty part; before the first entry if there is none.
     empty: f32,
     opacity: [f32; 4],
     color: [[f32; 2]; 3],
 }
 
 impl Piece {
-    /// Through the values at the Chebyshev points of `first..=last`, which is close to the best that there is.
+    /// A piece through the values at the Chebyshev points of `first..=last`. It is close to the best polynomial.
     fn through(entries: &[Entry], first: usize, last: usize) -> Self {
         let half = (last - first) as f64 / 2.0;
         let place =
@@ -46,7 +46,7 @@ impl Piece {
         let opacity = |i| [place(i, 4), value(place(i, 4), &|e| e.opacity)];
         let channel = |c: usize| {
             let [base, slope] = polynomial(std::array::from_fn(|i| [place(i, 2), value(place(i, 2), &|e| e.color[c])]));
-            // Not below black at either end.
+            // The line must not be below black at either end.
             [base - base.min(base + slope * (last - first) as f32).min(0.0), slope]
         };
         let mut piece = Self {
@@ -61,7 +61,7 @@ impl Piece {
         piece
     }
 
-    /// True if every entry of `first..=last` is met closely enough; `least` is what an opacity may be off anyway.
+    /// True if every entry of `first..=last` is within its permitted error; `least` is the permitted absolute error of an opacity.
     fn holds(&self, entries: &[Entry], last: usize, least: f32) -> bool {
         (self.first..=last).all(|i| {
             let (Entry { color, opacity }, x) = (entries[i], (i - self.first) as f32);
@@ -72,7 +72,7 @@ impl Piece {
         })
     }
 
-    /// The longest from `first` on, and its last entry. What has no opacity is a piece of its own.
+    /// The longest piece that starts at `first`, and its last entry. Entries without opacity are a piece of their own.
     fn longest(entries: &[Entry], first: usize, least: f32) -> (Self, usize) {
         let end = entries.len() - 1;
         let empty = entries[first..].iter().take_while(|e| e.opacity == 0.0).count();
@@ -81,7 +81,7 @@ impl Piece {
             return (Self { first, empty: last as f32, ..Self::default() }, last);
         }
         let fits = |last: usize| Some(Self::through(entries, first, last)).filter(|p| p.holds(entries, last, least));
-        // Two entries are met by a line.
+        // A line fits two entries exactly.
         let (mut best, mut good) = (Self::through(entries, first, first + 1), first + 1);
         let (mut bad, mut length) = (end + 1, 2);
         while good < end && bad - good > 1 {
@@ -114,8 +114,8 @@ fn polynomial<const N: usize>(points: [[f64; 2]; N]) -> [f32; N] {
     sum.map(|c| c as f32)
 }
 
-/// The words that follow the table, in columns of [`PIECES`]: where each piece begins, up to where it is empty, and its
-/// coefficients. Pieces that there are not begin past the table; where it takes too many, all of them do.
+/// The words that follow the table, in columns of [`PIECES`]: the starts of the pieces, the ends of their empty parts, and their coefficients. Unused
+/// pieces start past the table. If the function needs too many pieces, all are unused.
 pub fn pieces(colours: &[([f64; 3], f64)]) -> Vec<u32> {
     let narrow = |v: f64| v.clamp(0.0, 1.0) as f32;
     let entry = |&(color, opacity): &([f64; 3], f64)| Entry { color: color.map(narrow), opacity: narrow(opacity) };
@@ -146,13 +146,13 @@ pub fn pieces(colours: &[([f64; 3], f64)]) -> Vec<u32> {
 mod tests {
     use super::*;
 
-    /// Entries of an opacity and a grey by place from 0 to 1.
+    /// The entries of an opacity and a grey as functions of a place from 0 to 1.
     fn entries(of: impl Fn(f64) -> (f64, f64)) -> Vec<([f64; 3], f64)> {
         let entry = |i: usize| of(i as f64 / (TABLE_SIZE - 1) as f64);
         (0..TABLE_SIZE).map(entry).map(|(opacity, grey)| ([grey; 3], opacity)).collect()
     }
 
-    /// The opacity and red that the device computes at an entry's number.
+    /// The opacity and red that the device computes at an entry's index.
     fn seen(words: &[u32], x: f32) -> (f32, f32) {
         let column = |c: usize, i: usize| f32::from_bits(words[c * PIECES + i]);
         let i = (0..PIECES).rfind(|&i| x >= column(0, i)).expect("a piece");

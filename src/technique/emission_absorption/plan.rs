@@ -69,7 +69,7 @@ static FEATURES: [Features; 16] = {
 };
 const COMMON: usize = 2;
 
-/// `check_together` lets nothing through that is not listed.
+/// The listed features that are `wanted`. `check_together` refuses every combination that is not listed.
 fn permitted(wanted: Features) -> Result<&'static Features> {
     listed(TECHNIQUE.name, &FEATURES, wanted)
 }
@@ -121,7 +121,7 @@ impl Parameters {
     }
 }
 
-/// What colours a sample.
+/// The source of a sample's colour.
 enum Colours {
     /// A transfer function of the value.
     Function(TransferFunction),
@@ -134,20 +134,20 @@ struct Prepared {
     parameters: Parameters,
     volume: Arc<Volume>,
     colours: Colours,
-    /// [`PreparedView::steepest_slope`] is of the volume's own values, not of words.
+    /// The function of the volume's own values, not of words, for [`PreparedView::steepest_slope`].
     function_of_values: Option<TransferFunction>,
     plan: ViewPlan,
 }
 
 impl Parameters {
-    /// Half an entry of the table. The plain reference form, and what is of another order or style, take values as they are.
+    /// Half an entry of the table. The plain reference form, other orders and styles take values as they are.
     fn resolution(&self, function: &TransferFunction) -> Result<Option<f64>> {
         let plain = [plain(Interpolation::Trilinear, false), plain(Interpolation::Trilinear, true)];
         let [low, high] = function.domain();
         Ok(plain.contains(self.features()?).then_some(0.5 * (high - low) / TABLE_SIZE as f64))
     }
 
-    /// The plan for a volume, whose values in `opaque` are not transparent; `named` says what colours it.
+    /// The plan for a volume, whose values in `opaque` have an opacity; `named` is the description of the colours.
     fn plan(&self, volume: &Volume, opaque: Vec<[f64; 2]>, named: String) -> Result<ViewPlan> {
         let skip = self.empty_space_skipping && self.order == "front_to_back";
         let mut reasons = vec![named];
@@ -222,7 +222,7 @@ impl PreparedView for Prepared {
             let change = Some(("pre_integrated", json!(true)));
             ways.extend(possible.then_some(Way { words: ", pre-integrated", change, parameters: integrated }));
         }
-        // There is no gradient for shading to show.
+        // A volume of one value has no gradient to shade.
         let flat = self.volume.non_finite() == 0 && self.volume.range()[0] == self.volume.range()[1];
         if flat && given.shading {
             let unshaded = Parameters { shading: false, ..given.clone() };
@@ -255,7 +255,7 @@ impl PreparedView for Prepared {
         };
         let per_value = (entries - 1) as f64 / (high - low);
         device.table_scale = (volume.slope() * per_value) as f32;
-        // Half an entry, so that a value goes to the nearest.
+        // The half entry rounds a value to the nearest one.
         device.table_offset = ((volume.inter() - low) * per_value + 0.5) as f32;
         own.styles().apply(volume, &mut device);
         bytemuck::bytes_of(&device).to_vec()

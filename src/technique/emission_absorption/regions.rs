@@ -35,7 +35,7 @@ fn default_falloff() -> f64 {
 }
 
 impl Region {
-    /// Its share along one of its sides: 1 inside, falling to 0 at the ends.
+    /// The share of a value along one of its sides: 1 inside, falling to 0 at the ends.
     fn share(&self, [low, high]: [f64; 2], at: f64) -> f64 {
         let from_edge = (at - low).min(high - at) / (0.5 * (high - low));
         if from_edge < 0.0 {
@@ -71,16 +71,16 @@ pub fn check(regions: &[Region], at: &str) -> Result<()> {
     Ok(())
 }
 
-/// The regions' extent: values, and the greatest magnitude.
+/// The regions' extent: an interval of values, and the greatest magnitude.
 pub fn extent(regions: &[Region], volume: &Volume) -> ([f64; 2], f64) {
     let low = regions.iter().map(|r| r.value[0]).fold(f64::INFINITY, f64::min);
     let high = regions.iter().map(|r| r.value[1]).fold(f64::NEG_INFINITY, f64::max);
     let steep = regions.iter().map(|r| r.gradient[1]).fold(0.0, f64::max);
-    // A little more at each end, so that the outermost entries, which stand for all beyond, are empty.
+    // The margin makes the outermost entries empty, which stand for all values beyond.
     let margin = (high - low).max(1e-12) / (SIDE - 4) as f64;
     let voxel = volume.smallest_side();
     let [least, most] = volume.range();
-    // No gradient is steeper than the whole range from a voxel to the next, along all three axes.
+    // No gradient is steeper than the whole range from one voxel to the next, along all three axes.
     let possible = 1.75 * (most - least).max(1e-12) / voxel;
     ([low - 2.0 * margin, high + 2.0 * margin], steep.min(possible) * (SIDE as f64 / (SIDE - 2) as f64))
 }
@@ -101,7 +101,7 @@ pub fn table(regions: &[Region], volume: &Volume, opacity_scale: f64, step: f64)
     (0..SIDE * SIDE).flat_map(entry).collect()
 }
 
-/// The intervals of values that any region gives opacity.
+/// The intervals of values that have an opacity in any region.
 pub fn opaque(regions: &[Region]) -> Vec<[f64; 2]> {
     regions.iter().filter(|r| r.opacity_per_unit > 0.0).map(|r| r.value).collect()
 }

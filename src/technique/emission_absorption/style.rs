@@ -123,7 +123,7 @@ pub struct Styles<'a> {
 }
 
 impl Styles<'_> {
-    /// True if any is asked for.
+    /// True if any style is set.
     pub fn any(&self) -> bool {
         self.gradient_opacity.is_some()
             || self.silhouette.is_some()
@@ -132,7 +132,7 @@ impl Styles<'_> {
             || self.translucency.is_some()
     }
 
-    /// Tells the device. Gradients are in raw values there.
+    /// Writes the styles into the device's parameters, whose gradients are in raw values.
     pub fn apply(&self, volume: &Volume, device: &mut EmissionAbsorption) {
         let voxel = volume.smallest_side();
         let narrow = |c: [f64; 3]| c.map(|v| v as f32);

@@ -1,4 +1,4 @@
-//! The histogram on the device: some voxels a slice, counted in whole numbers, so that the table is the same for any number of threads.
+//! The histogram on the device. It counts some voxels per slice in whole numbers, so that the table is the same for any number of threads.
 
 use std::fmt::Write;
 use std::rc::Rc;
@@ -15,7 +15,7 @@ use crate::volume::Volume;
 
 /// Voxels of a work-item.
 const PER_ITEM: u32 = 4096;
-/// Counts behind those of the bins: below the range, above it, no number.
+/// Counts behind those of the bins: below the range, above it, NaN.
 const OTHERS: usize = 3;
 
 /// A histogram at work.
@@ -31,7 +31,7 @@ pub(super) struct Run {
 }
 
 impl Run {
-    /// Room for the counts.
+    /// Allocates the counts.
     pub fn new(device: &Device, volume: Arc<Volume>, voxels: Rc<Buffer>, bins: u32, range: [f64; 2]) -> Result<Self> {
         let raw = range.map(|value| (value - volume.inter()) / volume.slope());
         let pass = HistogramPass {

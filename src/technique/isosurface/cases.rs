@@ -1,4 +1,4 @@
-//! What tests run of `isosurface`.
+//! The cases that tests run of `isosurface`.
 
 use serde_json::json;
 

@@ -25,7 +25,7 @@ const STATE_WORDS: usize = 7;
 
 /// The tolerance of a crossing, in voxels.
 const TOLERANCE_VOXELS: f64 = 1e-4;
-/// The same in parts of the way through the volume: a few times the resolution of single precision.
+/// The same as a part of the path through the volume: a few times the resolution of single precision.
 const TOLERANCE_OF_WAY: f64 = 3e-7;
 /// A ray through transparent surfaces ends at this opacity.
 const OPACITY_THRESHOLD: f64 = 0.999;
@@ -86,7 +86,7 @@ impl Parameters {
         surfaces.len() > 1 || self.output == Output::Color && surfaces[0].opacity < 1.0
     }
 
-    /// Values that a cell has to have for a crossing in it.
+    /// The intervals of values that a cell must meet to contain a crossing.
     fn wanted(&self, surfaces: &[Surface]) -> Vec<[f64; 2]> {
         let least = surfaces.iter().map(|s| s.isovalue).fold(f64::INFINITY, f64::min);
         match self.sampling {
@@ -96,11 +96,11 @@ impl Parameters {
     }
 }
 
-/// Surfaces of a volume.
+/// The surfaces of a volume.
 struct Prepared {
     parameters: Parameters,
     volume: Arc<Volume>,
-    /// By ascending raw value.
+    /// The surfaces, by ascending raw value.
     surfaces: Vec<Surface>,
     plan: ViewPlan,
 }
@@ -169,7 +169,7 @@ impl PreparedView for Prepared {
     }
 
     fn set_shared(&self, camera: &Camera, view: &mut DeviceView) {
-        // Surfaces are looked for from one end of a step to the other, not at a place within it.
+        // Crossings are searched for from one end of a step to the other; the sample is not inside it.
         (view.jittered, view.place) = (0, 0.0);
         let shadowed = self.parameters.ambient_occlusion.is_some();
         let default = || if shadowed { LightRequest::diffuse_sky() } else { Default::default() };

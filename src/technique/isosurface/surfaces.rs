@@ -9,7 +9,7 @@ use crate::volume::Volume;
 
 /// The most surfaces of a render.
 pub const MOST_SURFACES: usize = 8;
-/// Linear colour of bone that has been lying about.
+/// The linear colour of old bone.
 const IVORY: [f64; 3] = [0.83, 0.74, 0.58];
 /// The isovalue of bone in a CT scan, Hounsfield units.
 const BONE_HOUNSFIELD: f64 = 300.0;
@@ -39,13 +39,13 @@ fn opaque() -> f64 {
 }
 
 impl Surface {
-    /// A surface, with what is not given by default.
+    /// A surface, with defaults for the arguments that are not given.
     pub fn new(isovalue: f64, color: Option<[f64; 3]>, opacity: Option<f64>) -> Self {
         Self { isovalue, color: color.unwrap_or(IVORY), opacity: opacity.unwrap_or(1.0) }
     }
 }
 
-/// Checks what the schema cannot say: no two surfaces have one value.
+/// Checks a rule that the schema cannot express: no two surfaces have one value.
 ///
 /// # Errors
 /// [`Error::Invalid`] naming the later of the two under `at`.
@@ -59,9 +59,8 @@ pub fn check(surfaces: &[Surface], at: &str) -> Result<()> {
     Ok(())
 }
 
-/// The isovalue where a request is silent: bone in Hounsfield units, else the threshold that separates two classes of voxels
-/// best, by the variance between them (Otsu, "A Threshold Selection Method from Gray-Level Histograms", IEEE Transactions on
-/// Systems, Man and Cybernetics 9(1), 1979).
+/// The isovalue if the request gives none: bone in Hounsfield units, else the threshold that separates two classes of voxels best, by the variance
+/// between them (Otsu, "A Threshold Selection Method from Gray-Level Histograms", IEEE Transactions on Systems, Man and Cybernetics 9(1), 1979).
 pub fn default_isovalue(volume: &Volume) -> f64 {
     if is_hounsfield(volume.range()) {
         return BONE_HOUNSFIELD;

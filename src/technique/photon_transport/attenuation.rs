@@ -1,8 +1,7 @@
 //! The attenuation of gamma photons in matter: published mass attenuation coefficients, and the part of them that is Compton scattering.
 //!
-//! The tables are of Hubbell & Seltzer, NISTIR 5632 (1995). Of each collision the part n_e σ_KN(E) / µ(E) is Compton scattering (n_e
-//! electrons per volume, free and at rest); the rest, which is photoelectric absorption and a little coherent scattering, is absorbed
-//! on the spot.
+//! The tables are of Hubbell & Seltzer, NISTIR 5632 (1995). The part n_e σ_KN(E) / µ(E) of each collision is Compton scattering (n_e electrons per
+//! volume, free and at rest). The rest, which is photoelectric absorption and a little coherent scattering, is absorbed on the spot.
 
 use std::f64::consts::PI;
 
@@ -11,7 +10,7 @@ use serde::Deserialize;
 
 use crate::error::{Error, Result};
 
-/// Below this a photon is absorbed where it is.
+/// The energy below which a photon is absorbed on the spot.
 pub const LEAST_KEV: f64 = 10.0;
 /// Rows of a medium in the kernel's table: `GAMMA_ROWS`.
 pub const ROWS: usize = 512;
@@ -176,7 +175,7 @@ pub fn klein_nishina_cm2(energy_kev: f64) -> f64 {
             - (1.0 + 3.0 * k) / (1.0 + 2.0 * k).powi(2))
 }
 
-/// Interpolated in the logarithms of both; constant beyond the ends.
+/// The table interpolated in the logarithms of both columns; constant beyond the ends.
 fn log_log(table: &[(f64, f64)], energy_kev: f64) -> f64 {
     let above = table.partition_point(|(e, _)| *e <= energy_kev);
     if above == 0 {
@@ -210,7 +209,7 @@ impl Attenuation {
         (mu_per_mm, if mu_per_mm > 0.0 { (compton_per_mm / mu_per_mm).min(1.0) } else { 0.0 })
     }
 
-    /// Checks that it is a material, or a table, and that a table is one.
+    /// Checks that it is either a material or a valid table.
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the field under `at`.

@@ -1,4 +1,4 @@
-//! What tests run of `photon_transport`.
+//! The cases that tests run of `photon_transport`.
 
 use serde_json::{Value, json};
 
@@ -20,7 +20,7 @@ pub(super) fn cases() -> Cases {
     Cases { all, tiny: tiny() }
 }
 
-/// A medium wherever there may be one.
+/// Parameters with the medium in each place that may have one.
 fn places(medium: &Value) -> [Value; 4] {
     let mut layer = medium.clone();
     layer["thickness_mm"] = json!(0.5);
@@ -32,7 +32,7 @@ fn places(medium: &Value) -> [Value; 4] {
     ]
 }
 
-/// The chamber; layers that refract, with a table, a histogram and the gather; delta tracking of a density by track length; gammas.
+/// The chamber; layers that refract, with a table, a histogram and the gather; delta tracking of a density by track length; gamma photons.
 fn tiny() -> Vec<Value> {
     let table = json!({"type": "tabulated", "cosines": [-1, 0, 1], "densities": [1, 0, 2]});
     let layers = json!([{"thickness_mm": 0.5, "index": 1.2, "phase": table},

@@ -2,10 +2,10 @@
 
 use rayon::prelude::*;
 
-/// For each voxel the greatest r, at most 255, such that all voxels of the grid at most r away along each axis have its label: the
-/// Chebyshev distance to the nearest voxel that touches another label, by its face, edge or corner. Two sweeps, each from
-/// the neighbours that it has passed (Rosenfeld & Pfaltz, "Sequential Operations in Digital Picture Processing", J. ACM 13(4),
-/// 1966). x runs fastest in `labels` as in what is returned.
+/// For each voxel the greatest r, at most 255, such that all voxels of the grid at most r away along each axis have its label: the Chebyshev distance
+/// to the nearest voxel that touches another label, by its face, edge or corner. There are two sweeps; each takes the distances of the neighbours
+/// that it has passed (Rosenfeld & Pfaltz, "Sequential Operations in Digital Picture Processing", J. ACM 13(4), 1966). x runs fastest in `labels` and
+/// in the result.
 pub fn clearances(labels: &[u16], dims: [usize; 3]) -> Vec<u8> {
     let mut clearance = vec![u8::MAX; labels.len()];
     clearance.par_chunks_mut(dims[0]).enumerate().for_each(|(row, out)| mark_borders(labels, dims, row, out));
@@ -16,15 +16,15 @@ pub fn clearances(labels: &[u16], dims: [usize; 3]) -> Vec<u8> {
     clearance
 }
 
-/// The row of voxels that is dy and dz from a row, where the grid has one.
+/// The row of voxels that is dy and dz from a row, if the grid has one.
 fn row_beside([_, ny, nz]: [usize; 3], row: usize, [dy, dz]: [isize; 2]) -> Option<usize> {
     let y = (row % ny).checked_add_signed(dy).filter(|y| *y < ny)?;
     let z = (row / ny).checked_add_signed(dz).filter(|z| *z < nz)?;
     Some(z * ny + y)
 }
 
-/// Sets what touches another label to 0. Across an edge or a corner it does if its neighbour in the row has another label than it
-/// or than what is beside that neighbour.
+/// Sets voxels that touch another label to 0. A voxel touches another label across an edge or a corner if its neighbour in the row differs in label
+/// from it or from the voxel beside that neighbour.
 fn mark_borders(labels: &[u16], dims: [usize; 3], row: usize, out: &mut [u8]) {
     let nx = dims[0];
     let own = &labels[row * nx..][..nx];
@@ -41,8 +41,8 @@ fn mark_borders(labels: &[u16], dims: [usize; 3], row: usize, out: &mut [u8]) {
     }
 }
 
-/// Brings a row's distances down to what its neighbours in the rows before it say (after it for `sense` -1), and those in it.
-/// `nearest` is for use meanwhile: one more than the row at each end.
+/// Lowers a row's distances to those of its neighbours in the rows before it (after it for `sense` -1), and in the row itself, plus one. `nearest` is
+/// scratch memory: one more than the row at each end.
 fn sweep(clearance: &mut [u8], dims: [usize; 3], row: usize, sense: isize, nearest: &mut [u8]) {
     let nx = dims[0];
     nearest.fill(u8::MAX);
@@ -68,7 +68,7 @@ fn sweep(clearance: &mut [u8], dims: [usize; 3], row: usize, sense: isize, neare
 mod tests {
     use super::*;
 
-    /// By trying one size after the other.
+    /// The clearance by trying one size after the other.
     fn by_looking(labels: &[u16], [nx, ny, nz]: [usize; 3], voxel: usize) -> u8 {
         let at = [voxel % nx, voxel / nx % ny, voxel / nx / ny];
         let same = |r: usize| {

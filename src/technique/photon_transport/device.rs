@@ -8,13 +8,13 @@ pub const STATE_WORDS: usize = 21;
 device_enum! {
     /// The geometry of the media (`kernels/shared/medium.h`).
     pub enum Media: "MEDIA" {
-        /// One everywhere.
+        /// One medium everywhere.
         Uniform,
-        /// One per layer along z.
+        /// One medium per layer along z.
         Layers,
-        /// One per voxel, by its label.
+        /// One medium per voxel, by its label.
         Labels,
-        /// One whose extinction is times a voxel's density.
+        /// One medium, whose extinction is multiplied by a voxel's density.
         Density,
     }
 }
@@ -40,11 +40,12 @@ device_enum! {
 }
 
 device_enum! {
-    /// The boundary condition at an end of the media.
+    /// The boundary condition at an end of the media. An absorbing boundary lets photons out, a cyclic one brings them back on the other side, and a
+    /// mirror reflects them.
     pub enum BoundaryKind: "BOUNDARY" {
-        /// Nothing.
+        /// Absorbing.
         Absorbing,
-        /// The other side.
+        /// Cyclic.
         Cyclic,
         /// A mirror.
         Mirror,
@@ -86,36 +87,36 @@ device_enum! {
 }
 
 device_enum! {
-    /// Entries of the ledger before the histogram. The first ten are weights that add up to all that was launched, the next two are parts
-    /// of exits; the others count.
+    /// Entries of the ledger before the histogram. The first ten are weights that sum to the launched weight, the next two are parts of exits; the
+    /// others are counts.
     pub enum LedgerEntry: "LEDGER" {
-        /// Left at x = 0. The exits are in the order of axes, the lower end of each first.
+        /// Weight that left at x = 0. The exits are in the order of axes, the lower end of each first.
         ExitMinusX,
-        /// Left at the other end of x.
+        /// Weight that left at the other end of x.
         ExitPlusX,
-        /// Left at y = 0.
+        /// Weight that left at y = 0.
         ExitMinusY,
-        /// Left at the other end of y.
+        /// Weight that left at the other end of y.
         ExitPlusY,
-        /// Left at z = 0.
+        /// Weight that left at z = 0.
         ExitMinusZ,
-        /// Left at the other end of z.
+        /// Weight that left at the other end of z.
         ExitPlusZ,
-        /// Absorbed.
+        /// Absorbed weight.
         Absorbed,
-        /// Lost in the roulette (or gained: below 0), by faults, or past the box.
+        /// Weight that was lost in the roulette (negative if gained), by faults, or past the box.
         Lost,
-        /// Reflected where the beam enters.
+        /// Weight that was reflected at the beam's entry.
         Specular,
-        /// Taken out by the time gate.
+        /// Weight that the time gate removed.
         Gated,
-        /// Left at z = 0 without a scattering.
+        /// Weight that left at z = 0 without a scattering.
         UnscatteredMinusZ,
-        /// Left at the other end of z without a scattering.
+        /// Weight that left at the other end of z without a scattering.
         UnscatteredPlusZ,
         /// Scatterings.
         Scatterings,
-        /// Photons of too many steps, or whose weight is not finite.
+        /// Photons that took too many steps, or whose weight is not finite.
         Faults,
         /// Collisions at which the majorant was below the extinction.
         Broken,
@@ -135,15 +136,15 @@ device_struct! {
         pub count: u32,
         /// Histories that a work-item takes at a time.
         pub per_item: u32,
-        /// One work-item in so many works.
+        /// The stride of working items: one work-item in `stride` works.
         pub stride: u32,
-        /// 1 if each working item has a grid of its own, and takes histories until there are no more.
+        /// 1 if each working item has a grid of its own and takes shares of histories until there are none.
         pub own_grids: i32,
-        /// The entry of the ledger that counts the histories that have been taken.
+        /// The entry of the ledger that counts the histories taken so far.
         pub taken_at: i32,
         /// Steps that a work-item may take in this launch.
         pub most_steps: u32,
-        /// 1 if the work-items go on with what the launch before has left.
+        /// 1 if the work-items resume the state that the launch before has left.
         pub resumed: i32,
         /// The seed, low and high word.
         pub seed: [u32; 2],
@@ -151,7 +152,7 @@ device_struct! {
 }
 
 device_struct! {
-    /// The kernel's own parameters. Lengths are in mm from the box's corner; `at_` is the place in the table at which something starts.
+    /// The kernel's own parameters. Lengths are in mm from the box's corner. An `at_` field is the index in the table at which something starts.
     pub struct PhotonTransport {
         /// Voxels along x, y, z.
         pub grid: [i32; 3],
@@ -165,7 +166,7 @@ device_struct! {
         pub low_mm: [f32; 3],
         /// Their upper ends.
         pub high_mm: [f32; 3],
-        /// 1 if they go further than the grid.
+        /// 1 if the media extend further than the grid.
         pub endless: i32,
         /// A `BoundaryKind` per axis.
         pub boundary: [i32; 3],
@@ -173,11 +174,11 @@ device_struct! {
         pub cells: [i32; 3],
         /// Sides of a cell.
         pub cell_mm: [f32; 3],
-        /// Cells per mm; 0 where there is but one cell.
+        /// Cells per mm; 0 if there is but one cell.
         pub cells_per_mm: [f32; 3],
-        /// Media that the table has room for.
+        /// The number of media that the table has room for.
         pub media: i32,
-        /// The refractive index, where there is but one.
+        /// The refractive index, if there is but one.
         pub index: f32,
         /// Layers.
         pub layers: i32,
@@ -185,7 +186,7 @@ device_struct! {
         pub at_layers: i32,
         /// Labels or densities of the voxels.
         pub at_voxels: i32,
-        /// Bytes of a label: 1 or 2. Where voxels are cells, a byte with its clearance follows.
+        /// Bytes of a label: 1 or 2. If voxels are cells, a byte with the voxel's clearance follows.
         pub label_bytes: i32,
         /// Majorants of the blocks.
         pub at_blocks: i32,
@@ -197,17 +198,17 @@ device_struct! {
         pub radius_bins: i32,
         /// Bins by angle.
         pub angle_bins: i32,
-        /// The axis that radii count from.
+        /// The axis from which radii are measured.
         pub beam_mm: [f32; 2],
         /// Refractive index outside.
         pub outside_index: f32,
         /// 1 if the outer faces reflect and refract.
         pub fresnel: i32,
-        /// 1 if what they reflect of the beam is lost.
+        /// 1 if the part of the beam that they reflect is lost.
         pub specular_entry: i32,
         /// 1 if refractive indices differ inside.
         pub mismatch: i32,
-        /// Optical path after which a photon is taken out.
+        /// Optical path at which the time gate removes a photon.
         pub gate_mm: f32,
         /// The march's step.
         pub march_step_mm: f32,
@@ -217,27 +218,27 @@ device_struct! {
         pub source: [f32; 3],
         /// Its direction, unit length.
         pub source_axis: [f32; 3],
-        /// Its edges, or the axes of its disk times its radius.
+        /// Its edges, or the axes of its disk times the disk's radius.
         pub source_u: [f32; 3],
         /// See `source_u`.
         pub source_v: [f32; 3],
         /// Cosine of the cone's half angle; -1 for all directions.
         pub source_cos_from: f32,
-        /// Weights below this meet the roulette.
+        /// Weights below this play Russian roulette.
         pub roulette_threshold: f32,
-        /// Probability to survive it.
+        /// The probability of surviving it.
         pub roulette_survival: f32,
         /// The quantity in the grid: a `Tally`.
         pub tally: i32,
-        /// Deposits of length are times this.
+        /// The scale of deposits of length.
         pub deposit_scale: f32,
-        /// Paths are counted times this.
+        /// The scale of paths in the ledger.
         pub paths_per_mm: f32,
         /// A photon that takes more steps than this is trapped, or has met a fault of arithmetic; it is counted as lost.
         pub most_steps: i32,
         /// Energy of the source's gamma photons.
         pub source_kev: f32,
-        /// Energy below which they are absorbed.
+        /// Energy below which gamma photons are absorbed.
         pub gamma_least_kev: f32,
         /// Its logarithm to the base 2.
         pub gamma_least_log2: f32,

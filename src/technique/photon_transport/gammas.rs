@@ -1,4 +1,4 @@
-//! Gamma photons in a scene: the kernel's table of their media, and what goes together with them.
+//! Gamma photons in a scene: the kernel's table of their media, and the rules for their parameters.
 
 use super::attenuation::{LEAST_KEV, ROWS};
 use super::geometry::{Geometry, Where};
@@ -7,7 +7,7 @@ use super::parameters::Parameters;
 use super::tracking::Tracking;
 use crate::error::{Error, Result};
 
-/// Extinction and albedo of every medium, even in the logarithm of the energy up to the source's.
+/// Extinction and albedo of every medium, at even spacing in the logarithm of the energy up to the source's.
 pub fn rows(media: &[Medium], source_kev: f64) -> Vec<f32> {
     let energy = |row: usize| LEAST_KEV * (source_kev / LEAST_KEV).powf(row as f64 / (ROWS - 1) as f64);
     let of = |m: &Medium, row: usize| m.attenuation.as_ref().map_or((0.0, 0.0), |a| a.at(energy(row)));
@@ -18,10 +18,10 @@ pub fn rows(media: &[Medium], source_kev: f64) -> Vec<f32> {
         .collect()
 }
 
-/// Checks that gamma media are whole and alone.
+/// Checks that all media are gamma media, and that each is complete.
 ///
 /// # Errors
-/// Media of both kinds, no attenuation, a tracker that goes by majorants.
+/// [`Error::Invalid`] for media of both kinds, missing attenuation, or a tracker with majorants.
 pub fn check(p: &Parameters, geometry: &Geometry, tracking: Tracking, at: &str) -> Result<()> {
     for (i, medium) in geometry.media.iter().enumerate() {
         let place = match geometry.place {

@@ -22,12 +22,12 @@ pub enum Where {
     Layers(Vec<f64>),
     /// A medium per voxel.
     Labels {
-        /// Its number.
+        /// The number of each voxel's medium.
         of_voxel: Vec<u16>,
         /// See [`Geometry::clearance`].
         clearance: OnceLock<Vec<u8>>,
     },
-    /// The medium's extinction times this.
+    /// A factor of the medium's extinction per voxel.
     Density(Vec<f32>),
 }
 
@@ -40,7 +40,7 @@ pub struct Geometry {
     pub media: Vec<Medium>,
     /// Size of the grid.
     pub size_mm: [f64; 3],
-    /// Its voxels.
+    /// The number of voxels along x, y, z.
     pub dims: [usize; 3],
     /// True if it is the lecture's chamber.
     pub chamber: bool,
@@ -50,7 +50,7 @@ impl Geometry {
     /// The geometry of a request.
     ///
     /// # Errors
-    /// More than one kind of it, layers without end before the last, labels without a medium, densities below 0.
+    /// [`Error::Invalid`] for more than one kind of geometry, a layer without end before the last, a label without a medium, or a density below 0.
     pub fn new(p: &Parameters, assets: &Assets, at: &str) -> Result<Self> {
         let given = [("media", p.media.is_some()), ("layers", p.layers.is_some()), ("medium", p.medium.is_some())];
         if given.iter().filter(|g| g.1).count() > 1 {
@@ -129,7 +129,7 @@ impl Geometry {
         Ok(Self { place: Where::Layers(ends), media, size_mm, dims: p.dims([60; 3]), chamber: false })
     }
 
-    /// The grid of a volume: its voxels, and its size unless the request gives one.
+    /// The grid of a volume: its voxels, and its size if the request gives none.
     fn grid_of(p: &Parameters, volume: &Volume, at: &str) -> Result<([usize; 3], [f64; 3])> {
         let dims = volume.dims();
         if let Some(grid) = p.grid
@@ -204,7 +204,7 @@ impl Geometry {
         Self { place: Where::Density(density), media: vec![medium], size_mm, dims, chamber: true }
     }
 
-    /// True if its photons are gammas.
+    /// True if its photons are gamma photons.
     pub fn is_gamma(&self) -> bool {
         self.media.iter().any(|m| m.phase.kind == "klein_nishina")
     }
@@ -214,7 +214,7 @@ impl Geometry {
         self.media.iter().any(|m| m.index != self.media[0].index)
     }
 
-    /// The clearance of each voxel (see [`clearances`]), for labels: computed when first asked for.
+    /// The clearance of each voxel (see [`clearances`]), for labels. It is computed at the first call.
     pub fn clearance(&self) -> Option<&[u8]> {
         match &self.place {
             Where::Labels { of_voxel, clearance } => Some(clearance.get_or_init(|| clearances(of_voxel, self.dims))),

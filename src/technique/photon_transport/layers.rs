@@ -68,7 +68,7 @@ impl Layer {
 /// The ends of the layers, mm; the last may be infinite.
 ///
 /// # Errors
-/// A thickness that is none.
+/// [`Error::Invalid`] for an invalid thickness.
 pub fn ends(layers: &[Layer], at: &str) -> Result<Vec<f64>> {
     let mut ends = Vec::new();
     let mut depth = 0.0;

@@ -1,4 +1,4 @@
-//! Media: how strongly they absorb and scatter, their refractive index and their phase function.
+//! Media: their absorption and scattering, their refractive index and their phase function.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -8,7 +8,7 @@ use super::device::MediumNumber;
 use crate::device::enums::DeviceEnum;
 use crate::scene::phase::Phase;
 
-/// Numbers of a medium that the kernel's table has room for.
+/// The numbers of a medium in the kernel's table, with one for padding.
 const NUMBERS: usize = MediumNumber::LENGTH + 1;
 
 /// A homogeneous medium.
@@ -42,19 +42,19 @@ impl Medium {
         self.mu_a_per_mm + self.mu_s_per_mm
     }
 
-    /// The scattered part of a collision; 1 where nothing collides.
+    /// The scattered part of a collision; 1 if nothing collides.
     pub fn albedo(&self) -> f64 {
         let extinction = self.extinction_per_mm();
         if extinction > 0.0 { self.mu_s_per_mm / extinction } else { 1.0 }
     }
 }
 
-/// The number of media that the kernel's table has room for: up to 16 fit in a register.
+/// The number of media that the kernel's table has room for. Up to 16 fit in a register.
 pub fn room(media: usize) -> usize {
     media.max(16)
 }
 
-/// The kernel's table of media: a number of all of them, then the next; then the rows of tabulated phase functions.
+/// The kernel's table of media: one number of all media, then the next number; then the rows of tabulated phase functions.
 pub fn table(media: &[Medium]) -> Vec<f32> {
     let room = room(media.len());
     let mut table = vec![0.0; NUMBERS * room];

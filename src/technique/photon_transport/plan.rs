@@ -12,9 +12,9 @@ use crate::device::enums::DeviceEnum;
 use crate::device::program::{Variant, listed};
 use crate::error::Result;
 
-/// Light in a vacuum, mm per ns.
+/// The speed of light in a vacuum, mm per ns.
 const LIGHT_MM_PER_NS: f64 = 299.792_458;
-/// Stands for no end.
+/// A length that stands for infinity.
 const ENDLESS_MM: f32 = 1e30;
 
 type Features = [(&'static str, i32); 3];
@@ -53,7 +53,7 @@ pub(super) static FEATURES: [Features; 20] = {
     ]
 };
 
-/// What the kernel is run with: data, no device needed to make it.
+/// The variant, parameters and tables of the kernel: data, made without a device.
 pub(super) struct DevicePlan {
     /// The kernel variant.
     pub variant: Variant,
@@ -81,7 +81,7 @@ fn features(geometry: &Geometry, tracking: Tracking) -> Result<&'static Features
     permitted([("MEDIA", media.code()), ("TRACKING", tracking.code()), ("GAMMA", geometry.is_gamma().into())])
 }
 
-/// Appends to the table and says where.
+/// Appends to the table and returns the index of the appended part.
 fn append(table: &mut Vec<f32>, more: impl IntoIterator<Item = f32>) -> i32 {
     let at = table.len() as i32;
     table.extend(more);
@@ -93,12 +93,12 @@ impl Simulation {
         std::array::from_fn(|a| self.geometry.size_mm[a] / self.geometry.dims[a] as f64)
     }
 
-    /// The scale of deposits, which makes them neither too large nor too small for the fixed point; the result is divided by it.
+    /// The scale of deposits, which keeps them within the range of the fixed point; the result is divided by it.
     pub(super) fn deposit_scale(&self) -> f64 {
         if self.is_absorbed() && !self.track { 1.0 } else { 1.0 / self.spacing_mm()[0] }
     }
 
-    /// The length that mean paths are counted in.
+    /// The unit of mean paths.
     pub(super) fn path_unit_mm(&self) -> f64 {
         self.geometry.size_mm.iter().map(|s| s * s).sum::<f64>().sqrt() / 1_048_576.0
     }
@@ -139,7 +139,7 @@ impl Simulation {
         device.cells_per_mm = std::array::from_fn(|a| if device.cells[a] > 1 { 1.0 / device.cell_mm[a] } else { 0.0 });
     }
 
-    /// The clearance of each voxel, where photons may cross several at once: tracks are scored voxel by voxel.
+    /// The clearance of each voxel, if photons may cross several at once. Otherwise tracks are scored voxel by voxel.
     pub(super) fn clearance(&self) -> Option<&[u8]> {
         if self.tracking == Tracking::Exact && !self.track { self.geometry.clearance() } else { None }
     }
@@ -156,7 +156,7 @@ impl Simulation {
                 _ => BoundaryKind::Absorbing,
             };
             device.boundary[a] = boundary.code();
-            // Layers go on to all sides unless the request says where they end.
+            // Layers are infinite along x and y unless the request gives a boundary there.
             if layered && a < 2 && kind.is_none() {
                 (device.low_mm[a], device.high_mm[a], device.endless) = (-ENDLESS_MM, ENDLESS_MM, 1);
             }
@@ -168,7 +168,7 @@ impl Simulation {
         }
     }
 
-    /// What the kernel is run with.
+    /// Makes the kernel's variant, parameters and tables.
     ///
     /// # Errors
     /// [`crate::error::Error::Internal`] for a combination of features that is not listed.
@@ -208,7 +208,7 @@ impl Simulation {
                 device.at_layers = append(&mut table, std::iter::once(0.0).chain(ends));
             }
             Where::Labels { of_voxel, .. } => {
-                // As bytes where they fit, so that more of them are near; a word more, for words are read from any byte on.
+                // Labels are bytes if they fit, which need less cache. The table has a spare word at its end, since words are read from any byte on.
                 let label_bytes = if g.media.len() <= 256 { 1 } else { 2 };
                 let (with_clearance, clearance) = (self.tracking == Tracking::Exact, self.clearance());
                 let mut bytes = Vec::with_capacity((label_bytes + usize::from(with_clearance)) * of_voxel.len() + 8);
@@ -237,7 +237,7 @@ impl Simulation {
             device.radius_bins = histogram.radius_edges_mm.len() as i32 - 1;
             device.angle_bins = histogram.angle_edges_deg.len() as i32 - 1;
             device.at_radii = append(&mut table, histogram.radius_edges_mm.iter().map(|r| *r as f32));
-            // The cosine at 90 degrees is not quite 0.
+            // In floating point the cosine of 90 degrees is not quite 0.
             let cosine = |deg: &f64| if *deg >= 90.0 { -1.0 } else { (deg * PI / 180.0).cos() as f32 };
             device.at_cosines = append(&mut table, histogram.angle_edges_deg.iter().map(cosine));
             bins = 2 * device.radius_bins as usize * device.angle_bins as usize;
@@ -256,7 +256,7 @@ impl Simulation {
         Ok(Variant::new(TECHNIQUE.name, None, features(&self.geometry, self.tracking)?))
     }
 
-    /// In a thin box only light that total reflection keeps in takes many steps: without absorption it would never end.
+    /// The most steps of a photon. In a thin box only totally reflected light takes many steps; without absorption it would never end.
     fn most_steps(&self, cells: [i32; 3]) -> i32 {
         let across: f64 = self.geometry.size_mm.iter().sum();
         let thin = self.extinction_range_per_mm[1] * across < 0.1;
@@ -279,7 +279,7 @@ impl Simulation {
 }
 
 impl Parameters {
-    /// The request's grid, or another.
+    /// The request's grid, or `otherwise`.
     pub(super) fn dims(&self, otherwise: [usize; 3]) -> [usize; 3] {
         self.grid.map_or(otherwise, |g| g.map(|n| n as usize))
     }

@@ -1,4 +1,4 @@
-//! The simulation on the device: its grid fills in batches of photons, and a look is due each time their number has doubled.
+//! The simulation on the device. Its grid fills in batches of photons, and a look is due each time their number has doubled.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -14,17 +14,17 @@ use crate::volume::Volume;
 
 /// Batches of equal size: enough for the standard errors of the ledger, and a power of two for the doublings.
 const BATCHES: u64 = 32;
-/// Looks that are due while the grid fills, each time the batches have doubled, besides the last.
+/// The number of looks that are due while the grid fills, each time the batches have doubled, besides the last.
 pub const LOOKS_ON_THE_WAY: u32 = BATCHES.ilog2();
 
-/// Photons of a work-item where items are many: enough that launching an item does not count.
+/// Photons of a work-item if there are many items: enough that the launch of an item does not count.
 const PHOTONS_PER_ITEM: usize = 32;
-/// Times that an item with a grid of its own comes for photons, if all are as fast: so that none works long after the others.
+/// The number of shares that an item with its own grid takes if all are equally fast, so that none works long after the others.
 const SHARES_PER_ITEM: u64 = 64;
-/// The grids of all items together take at most this.
+/// The most bytes of the grids of all items together.
 const OWN_GRIDS_BYTES: usize = 1 << 27;
 
-/// How many items work at a time with a grid each, where lanes say that the device is a CPU and the grids fit.
+/// The number of items that work at a time with their own grids; `None` unless the lanes show that the device is a CPU and the grids fit.
 fn own_grids(info: &DeviceInfo, cells: usize) -> Option<usize> {
     let items = info.compute_units as usize;
     (info.lanes > 1 && 8 * cells * items <= OWN_GRIDS_BYTES).then_some(items)
@@ -38,13 +38,13 @@ pub(super) struct Run {
     parameters: Buffer,
     pass: Buffer,
     grid: Buffer,
-    /// How many items have a grid of their own; none where one is shared.
+    /// The number of items that have their own grids; `None` if one grid is shared.
     grids: Option<usize>,
     ledger: Buffer,
-    /// The ledger's sums after the last batch, and what each batch added.
+    /// The ledger's sums after the last batch, and each batch's part of them.
     ledger_before: Vec<u64>,
     ledgers: Vec<Vec<u64>>,
-    /// Photons that are done, and those that make the whole.
+    /// The photons that are done, and the batches that are complete.
     done: u64,
     total: u64,
     slice_length: SliceLength,
@@ -54,7 +54,7 @@ pub(super) struct Run {
     device_time: Duration,
 }
 
-/// Photons that are launched together, in one launch of the kernel or in several.
+/// Photons that are launched together, in one or several launches of the kernel.
 struct Launch {
     pass: FieldPass,
     items: usize,
@@ -63,7 +63,7 @@ struct Launch {
 }
 
 impl Run {
-    /// Room for a simulation whose kernel is built.
+    /// Allocates the buffers of a simulation whose kernel is built.
     pub fn new(device: &Device, simulation: Arc<Simulation>) -> Result<Self> {
         let plan = simulation.take_plan()?;
         let grids = own_grids(device.info(), plan.cells);
@@ -73,7 +73,7 @@ impl Run {
             pass: device.allocate(size_of::<FieldPass>())?,
             grid: device.upload(&vec![0; 8 * plan.cells * grids.unwrap_or(1)], 0)?,
             grids,
-            // Behind the ledger is the number of photons that items have taken.
+            // Behind the ledger stands the number of photons that items have taken.
             ledger: device.upload(&vec![0; 8 * (plan.ledger + 1)], 0)?,
             ledger_before: vec![0; plan.ledger],
             ledgers: Vec::new(),
@@ -106,7 +106,7 @@ impl Run {
     /// The next launch: photons for about `slice`, up to the end of the batch at `end`.
     fn next_launch(&self, info: &DeviceInfo, slice: Duration, end: u64) -> Launch {
         let (stride, wanted) = match self.grids {
-            // A few items that take photons as long as there are any: their lanes are refilled until the last.
+            // A few items take photons from a shared queue until it is empty. Their lanes are refilled until then.
             Some(grids) => (info.local_size, grids),
             None => (1, self.slice_length.items(info, slice, PHOTONS_PER_ITEM)),
         };
@@ -129,7 +129,7 @@ impl Run {
         Launch { pass, items: wanted.min(count.div_ceil(per_item) as usize) * stride, took: Duration::ZERO }
     }
 
-    /// Works for about `slice` on the photons of `launch`. Returns it where they are not done.
+    /// Works for about `slice` on the photons of `launch`. Returns it if some are not done.
     fn work(&mut self, device: &Device, slice: Duration, mut launch: Launch) -> Result<Option<Launch>> {
         launch.pass.most_steps = self.resume.steps();
         device.write(&mut self.pass, 0, bytemuck::bytes_of(&launch.pass))?;

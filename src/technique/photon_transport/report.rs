@@ -22,7 +22,7 @@ pub const FRACTIONS: [&str; 12] = [
     "unscattered_minus_z",
     "unscattered_plus_z",
 ];
-/// Sums past this may soon wrap round.
+/// A sum above this may soon wrap round.
 const OVERFLOW: u64 = 1 << 61;
 
 /// The sums of the batches.
@@ -110,7 +110,7 @@ impl Simulation {
         result
     }
 
-    /// By what part the march's mean free path is too long where the medium is densest.
+    /// The relative excess of the march's mean free path where the medium is densest.
     fn march_bias(&self) -> f64 {
         let depth = self.march_step_mm() * self.extinction_range_per_mm[1];
         if self.tracking == super::tracking::Tracking::March { march_bias(depth) } else { 0.0 }
@@ -155,7 +155,7 @@ mod tests {
         assert!(!flags(1 << 60, 1 << 59), "sums with room to spare");
         assert!(flags((1 << 61) + 1, 0), "a voxel's sum");
         assert!(flags(0, (1 << 60) + 1), "the ledger's sum of two batches");
-        // Wrapped round: the sum of a positive 2^63 is negative.
+        // The sum of a positive 2^63 is negative: it has wrapped round.
         assert!(flags(1 << 63, 0), "a sum that has wrapped round");
         drop(std::fs::remove_dir_all(folder));
         Ok(())

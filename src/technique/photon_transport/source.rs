@@ -52,7 +52,7 @@ pub struct Source {
 }
 
 impl SourceKind {
-    /// The kind of a name in requests; a pencil where there is none of that name.
+    /// The kind of a name in requests; a pencil for an unknown name.
     fn named(name: &str) -> Self {
         match name {
             "isotropic" => Self::Isotropic,
@@ -74,7 +74,7 @@ impl LightSource {
     /// The source in a box of a size.
     ///
     /// # Errors
-    /// A direction of no length, a point outside the box, a beam that misses it.
+    /// [`Error::Invalid`] for a direction of no length, a point outside the box, or a beam that misses it.
     pub fn resolve(&self, size_mm: [f64; 3], chamber: bool, at: &str) -> Result<Source> {
         let size = DVec3::from(size_mm);
         let name = self.kind.as_deref().unwrap_or(if chamber { "isotropic" } else { "pencil" });
@@ -141,7 +141,7 @@ impl Source {
         })
     }
 
-    /// Writes what the kernel needs.
+    /// Writes the source into the kernel's parameters.
     pub fn apply(&self, device: &mut PhotonTransport) {
         let floats = |v: DVec3| v.as_vec3().to_array();
         device.source_type = self.kind.code();

@@ -8,7 +8,7 @@ pub use crate::technique::majorant::Tracking;
 /// The tracker of a request, with the reason in words.
 ///
 /// # Errors
-/// A tracker that cannot see the interfaces of the scene.
+/// [`Error::Invalid`] for a tracker that cannot detect the interfaces of the scene.
 pub fn choose(p: &Parameters, geometry: &Geometry, track: bool, at: &str) -> Result<(Tracking, String)> {
     let tracking = match p.tracking.as_str() {
         "exact" => Tracking::Exact,
@@ -28,13 +28,13 @@ pub fn choose(p: &Parameters, geometry: &Geometry, track: bool, at: &str) -> Res
     Ok((tracking, format!("{}: {why}", tracking.name())))
 }
 
-/// Boundaries of cubes that a photon meets in a cube's side, on average over directions.
+/// The mean number of boundaries of cubes that a photon crosses per side of a cube, averaged over directions.
 const BOUNDARIES_PER_SIDE: f64 = 1.5;
-/// Delta tracking is taken where it looks up less than this part of what voxels would.
+/// Delta tracking is chosen if it needs less than this part of the look-ups of voxels.
 const CLEARLY_LESS: f64 = 0.7;
 
-/// The cheapest tracker that is unbiased for the scene. Tracks are shared out among the voxels in any case, so that only where
-/// collisions are scored can voxels be left out.
+/// The cheapest unbiased tracker for the scene. Tracks are scored voxel by voxel in any case, so that voxels can be skipped only if collisions are
+/// scored.
 fn cheapest(p: &Parameters, geometry: &Geometry, track: bool) -> (Tracking, String) {
     let exact = |why: &str| (Tracking::Exact, format!("exact: {why}"));
     let Some(voxels) = geometry.voxel_extinction_per_mm() else {
@@ -51,7 +51,7 @@ fn cheapest(p: &Parameters, geometry: &Geometry, track: bool) -> (Tracking, Stri
     }
     let mean = |v: &[f32]| v.iter().map(|e| f64::from(*e)).sum::<f64>() / v.len() as f64;
     let voxel_mm = (0..3).map(|a| geometry.size_mm[a] / geometry.dims[a] as f64).sum::<f64>() / 3.0;
-    // Voxels with a clearance are crossed in one step.
+    // A photon crosses voxels with a clearance in one step.
     let per_voxel = |clearance: &[u8]| {
         clearance.iter().map(|r| 1.0 / (2.0 * f64::from(*r) + 1.0)).sum::<f64>() / clearance.len() as f64
     };
@@ -76,7 +76,7 @@ pub struct Majorants {
     pub blocks: [usize; 3],
     /// Voxels along a block's sides.
     pub voxels: [usize; 3],
-    /// Greatest extinction in each, per mm, times the request's scale.
+    /// The greatest extinction in each block, per mm, times the request's scale.
     pub per_mm: Vec<f32>,
 }
 

@@ -1,4 +1,4 @@
-//! What tests run of `projection`.
+//! The cases that tests run of `projection`.
 
 use serde_json::json;
 

@@ -25,7 +25,7 @@ use crate::volume::{Volume, VoxelType};
 /// Words of a lane that a launch leaves to the next: a packet's best value.
 const STATE_WORDS: usize = 1;
 
-/// The optical depth of a bright ray in an X-ray by default: an eighth gets through.
+/// The optical depth of a bright ray in an X-ray by default. Its transmittance is about an eighth.
 const XRAY_OPTICAL_DEPTH: f64 = 2.0;
 
 type Features = [(&'static str, i32); 2];
@@ -121,7 +121,7 @@ struct Prepared {
 }
 
 impl Parameters {
-    /// Half an entry of the table of colours, where samples are taken and not written to the film as they are.
+    /// Half an entry of the table of colours, if samples are taken and become colours.
     fn resolution(&self, window: &Window) -> Option<f64> {
         let plain = !self.walked() && self.interpolation() == Interpolation::Trilinear && self.output != Output::Value;
         let [per_value, _] = window.scale_and_offset();

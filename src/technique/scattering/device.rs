@@ -5,15 +5,16 @@ use crate::{device_enum, device_struct};
 device_enum! {
     /// The variation of density in the volume.
     pub enum Density: "DENSITY" {
-        /// It is the same everywhere.
+        /// The same density everywhere.
         Constant,
-        /// It is interpolated between voxels.
+        /// A density that is interpolated between voxels.
         Grid,
     }
 }
 
 device_struct! {
-    /// Their own parameters. Positions are in index units, lengths in world units; `at_` says where in the table something starts.
+    /// The kernels' own parameters. Positions are in index units, lengths in world units. An `at_` field is the index in the table at which something
+    /// starts.
     pub struct Scattering {
         /// Column-major map from index to world, three rows and four columns.
         pub world_from_index: [f32; 12],
@@ -21,7 +22,7 @@ device_struct! {
         pub cells: [i32; 3],
         /// Voxels along a cell's sides.
         pub voxels_per_cell: [f32; 3],
-        /// Cells per voxel; 0 where there is but one cell.
+        /// Cells per voxel; 0 if there is but one cell.
         pub cells_per_voxel: [f32; 3],
         /// 1 if one majorant stands for the whole volume.
         pub whole: i32,
@@ -31,17 +32,17 @@ device_struct! {
         pub density_offset: f32,
         /// See `density_scale`.
         pub density_most: f32,
-        /// The density where it is the same everywhere.
+        /// The density if it is the same everywhere.
         pub density_box: f32,
         /// Extinction at a density of 1, by colour.
         pub sigma_t: [f32; 3],
         /// The greatest of them.
         pub sigma_most: f32,
-        /// The three over the greatest.
+        /// The three extinctions over the greatest.
         pub colour: [f32; 3],
         /// 1 if they differ.
         pub chromatic: i32,
-        /// Majorant at a density of 1; of the whole volume where there is but one, or its extinction where it is the same everywhere.
+        /// Majorant at a density of 1: the whole volume's if there is but one, or the extinction if it is the same everywhere.
         pub majorant: f32,
         /// The march's step.
         pub march_step: f32,
@@ -55,31 +56,31 @@ device_struct! {
         pub phase: [f32; 4],
         /// Lights besides the sky.
         pub lights: i32,
-        /// The lights.
+        /// The lights' place in the table.
         pub at_lights: i32,
-        /// 1 if rays can meet any of them.
+        /// 1 if rays can meet any of the lights.
         pub discs: i32,
         /// 1 if there is a sky.
         pub sky: i32,
-        /// 1 if the eye sees it.
+        /// 1 if the eye sees the sky.
         pub sky_visible: i32,
-        /// Its radiance straight above.
+        /// The sky's radiance straight above.
         pub sky_zenith: [f32; 3],
-        /// At the horizon.
+        /// The sky's radiance at the horizon.
         pub sky_horizon: [f32; 3],
-        /// Straight below.
+        /// The sky's radiance straight below.
         pub sky_ground: [f32; 3],
-        /// Upwards.
+        /// The sky's up direction.
         pub sky_up: [f32; 3],
         /// 1 if a ray in any direction may meet light: a sky, lights that have a size, or emission.
         pub lit_by_chance: i32,
-        /// 1 if lights are aimed at.
+        /// 1 if next-event estimation aims at lights.
         pub next_event: i32,
-        /// A path ends at a collision after so many.
+        /// The number of scatterings after which a path ends at its next collision.
         pub max_scatterings: i32,
-        /// Light below this meets the roulette.
+        /// Light below this plays Russian roulette.
         pub roulette_threshold: f32,
-        /// Samples of more luminance than this are scaled to it; 0: none are.
+        /// The luminance that brighter samples are scaled down to; 0 for no limit.
         pub clamp_luminance: f32,
         /// 1 if points on a ray are also sampled by the angle to a light (equiangular sampling).
         pub equiangular: i32,

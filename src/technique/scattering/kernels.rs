@@ -14,7 +14,7 @@ use crate::technique::view::{TILE, TILES_HEADER};
 use crate::technique::view_words;
 use crate::volume::VoxelType;
 
-/// Words of a lane that a launch leaves to the next: a sample of `single_scatter`, which has more than a path, and its mask.
+/// Words of a lane that a launch leaves to the next: a sample of `single_scatter`, which is larger than a path, and its mask.
 pub(super) const STATE_WORDS: usize = 54;
 
 pub(super) type Features = [(&'static str, i32); 3];
@@ -62,12 +62,12 @@ pub(in crate::technique) fn source(kernel: &'static str) -> Source {
 /// The listed variant of a technique with those features.
 ///
 /// # Errors
-/// [`crate::error::Error::Internal`] when there is none.
+/// [`crate::error::Error::Internal`] if there is none.
 pub(super) fn permitted(kernel: &str, wanted: Features) -> Result<&'static Features> {
     listed(kernel, &FEATURES, wanted)
 }
 
-/// The first is a built-in's.
+/// The variants of a kernel. The first is a built-in's.
 fn variants(kernel: &'static str) -> Vec<Variant> {
     let mut types = VoxelType::ALL;
     types.reverse();
@@ -92,7 +92,7 @@ mod tests {
         assert!(said.contains("volume_path DENSITY=0 TRACKING=1 INTERPOLATION=0"), "{said}");
     }
 
-    /// A light or a phase function of a type has the number that kernels know its kind by.
+    /// The type of a light or a phase function gives the number of its kind in the kernels.
     #[test]
     fn kinds_of_lights_and_phases_are_the_devices() {
         let lights = json!([{"type": "sun"}, {"type": "point", "position": [0, 0, 1]},

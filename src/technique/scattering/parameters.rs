@@ -81,7 +81,7 @@ fn default_roulette() -> f64 {
 }
 
 impl Parameters {
-    /// Checks what the schema cannot say.
+    /// Checks the rules that the schema cannot express.
     ///
     /// # Errors
     /// [`Error::Invalid`] naming the field under `at`.
@@ -95,7 +95,7 @@ impl Parameters {
         Ok(())
     }
 
-    /// How densities lie between voxels: exact tracking takes the nearest.
+    /// The interpolation of densities. Exact tracking takes the nearest voxel.
     pub fn interpolation(&self) -> Interpolation {
         let otherwise =
             if self.tracking == Tracking::Exact { Interpolation::Nearest } else { Interpolation::Trilinear };

@@ -22,12 +22,12 @@ use crate::technique::slab::missing;
 use crate::technique::{CellUse, Open, PreparedView, Random, Settings, Subject, View, ViewPlan};
 use crate::volume::Volume;
 
-/// Steps of less than this part of a volume's voxels along an axis are lost in single precision.
+/// The smallest step as a part of the voxels along an axis; shorter steps are lost in single precision.
 const LOST: f64 = 1.0 / (1u64 << 20) as f64;
-/// Voxels that the mean density is taken of.
+/// The number of voxels that give the mean density.
 const MEAN_OF: usize = 4096;
 
-/// The part of the scattered light that a picture may lack without a word.
+/// The part of the scattered light that a picture may lack without a warning.
 const SCATTERINGS_MISSING: f64 = 0.01;
 
 /// A scattering view with valid parameters.
@@ -67,15 +67,15 @@ impl Scatterer {
         volume.non_finite() == 0 && volume.range()[0] == volume.range()[1]
     }
 
-    /// The part of the scattered light that is scattered more often than it is followed: that of a slab as deep as the volume is along
-    /// the axis that it is the least deep along.
+    /// The part of the scattered light that is scattered more often than this view follows it, for a slab as deep as the volume is along its
+    /// shallowest axis.
     fn missing(&self, volume: &Volume) -> f64 {
         let followed = if self.kernel == "single_scatter" { Some(1) } else { self.parameters.max_scatterings };
         let (Some(followed), medium) = (followed, &self.parameters.medium) else { return 0.0 };
         let density = greatest_along_axes(volume, |v| medium.density_of(v)).into_iter().fold(f64::INFINITY, f64::min);
         let (sigma, albedo) = (medium.sigma_t_per_unit(volume), medium.albedo.rgb());
         let of = |c: usize| missing(sigma[c] * density, albedo[c], followed);
-        // Grey media, which most are, need one of the three.
+        // Most media are grey; these need one of the three.
         let grey = (1..3).all(|c| sigma[c] == sigma[0] && albedo[c] == albedo[0]);
         (0..if grey { 1 } else { 3 }).map(of).fold(0.0, f64::max)
     }
@@ -101,7 +101,7 @@ impl Scatterer {
         Ok((permitted(self.kernel, wanted)?, format!("tracking {why}")))
     }
 
-    /// A march whose step is lost in the rounding of places along some axis would never end.
+    /// Refuses a march whose step is lost in the rounding of positions along an axis: it would never end.
     fn check_march(&self, volume: &Volume) -> Result<()> {
         let largest = volume.spacing().into_iter().fold(0.0, f64::max);
         let most = volume.dims().into_iter().max().unwrap_or(1) as f64;

@@ -1,4 +1,4 @@
-//! The settings of scattering views: how many scatterings are followed, and how many of the lights.
+//! The settings of scattering views: the number of scatterings, and the number of lights.
 
 use std::sync::Arc;
 
@@ -11,20 +11,20 @@ use crate::technique::optics::Optics;
 use crate::technique::{Open, Setting, Settings};
 use crate::volume::Volume;
 
-/// Scatterings that are tried after all of them.
+/// The numbers of scatterings that are tried after the complete one.
 const SCATTERINGS: [u32; 4] = [8, 4, 2, 1];
-/// A bound that is off by as much rules a setting out: it is of a slab, and the scene is not that.
+/// The factor by which a bound must exceed the permitted error to rule a setting out: the bound is of a slab, and the scene is not a slab.
 const SLACK: f64 = 3.0;
-/// Lights that are tried without, at most.
+/// The most lights that are left out.
 const FAINTEST: usize = 3;
 
 /// The technique that follows light through one scattering.
 const ONCE: &str = "single_scatter";
-/// Parameters that it does not have.
+/// The parameters that it does not have.
 pub(in crate::technique) const NOT_OF_ONCE: [&str; 3] = ["max_scatterings", "next_event", "roulette_threshold"];
 
 impl Scatterer {
-    /// What the scene is like.
+    /// The optics of the scene.
     pub(super) fn optics_of(&self, volume: &Volume) -> Optics {
         let medium = &self.parameters.medium;
         let sigma = medium.sigma_t_per_unit(volume).into_iter().fold(0.0, f64::max);
@@ -38,7 +38,7 @@ impl Scatterer {
         }
     }
 
-    /// Fewer scatterings where the technique is open, and without the faintest lights.
+    /// Settings with fewer scatterings, if the technique is open, and settings without the faintest lights.
     pub(super) fn settings_of(&self, volume: &Volume, open: &Open<'_>) -> Settings {
         let name = self.kernel;
         let words = if name == ONCE { format!("{name}, as asked") } else { format!("{name}, every scattering") };
@@ -87,7 +87,7 @@ impl Scatterer {
         }
     }
 
-    /// A setting without these lights; the one before is without one of these fewer.
+    /// A setting without these lights, based on the one without one of them fewer.
     fn without(&self, setting: &Setting, faintest: &[usize]) -> Option<Setting> {
         let mut parameters = self.parameters.clone();
         let lights = parameters.lights.take()?.into_iter().enumerate();

@@ -1,4 +1,4 @@
-//! What tests run of `slice`.
+//! The cases that tests run of `slice`.
 
 use serde_json::json;
 

@@ -17,7 +17,7 @@ use crate::volume::{Volume, VoxelType};
 
 type Features = [(&'static str, i32); 1];
 
-/// Every interpolation may be built; the first before the service is ready.
+/// Every interpolation may be built; the first is built before the service is ready.
 static FEATURES: [Features; 4] = {
     use Interpolation::{BSpline, CatmullRom, Nearest, Trilinear};
     [

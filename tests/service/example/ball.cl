@@ -18,7 +18,7 @@ kernel void ball(constant View *view, constant Ball *params, global const uchar 
         Int column = corner.x + LANE_IDS % TILE_W, row = corner.y + LANE_IDS / TILE_W;
         Real x = to_real(column * view->stride) + view->offset[0], y = to_real(row * view->stride) + view->offset[1];
         Ray ray = camera_ray(view, x, y);
-        // |o + t d|² = 1: the lesser root.
+        // The lesser root of |o + t d|² = 1.
         Real3 o = in_ball(ray.origin, 0.5f), d = in_ball(ray.direction, 0.0f);
         Real a = dot3(d, d), b = dot3(o, d), c = dot3(o, o) - 1.0f, discriminant = b * b - a * c;
         Mask hit = MASK(discriminant > 0.0f) & MASK(ray.t_far > ray.t_near);

@@ -1,7 +1,7 @@
-// Jacobi's iteration for Laplace's equation between two plates: u is 0 on the face at the least z and 1 on that at the greatest, and
-// does not change across the others. One work-item is one voxel of some planes of the grid.
+// Jacobi's iteration for Laplace's equation between two plates: u is 0 on the face at the least z and 1 on the face at the greatest; its
+// derivative across the other faces is 0. One work-item is one voxel of some planes of the grid.
 
-// The potential of a neighbour; beyond a plate it is mirrored about the plate's own, beyond another face about the face.
+// The potential of a neighbour. Beyond a plate it is mirrored about the plate's potential, beyond another face about the face.
 static inline float neighbour(constant PotentialPass *pass, global const float *u, int x, int y, int z) {
     x = clamp(x, 0, pass->dims[0] - 1), y = clamp(y, 0, pass->dims[1] - 1);
     int inside = clamp(z, 0, pass->dims[2] - 1);

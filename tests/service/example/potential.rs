@@ -1,7 +1,7 @@
 //! # `potential`
 //!
-//! The electric potential between two plates: Laplace's equation ∇²u = 0 by Jacobi's iteration, until the change of an iteration is small.
-//! A field with kernels that are named, a range of three dimensions, a reduction, and a decision of the host between iterations.
+//! The electric potential between two plates: Laplace's equation ∇²u = 0 by Jacobi's iteration, until the change of an iteration is small. It is a
+//! field with named kernel functions, a range of three dimensions, a reduction, and a decision of the host between iterations.
 //!
 //! | parameter | unit | range | default |
 //! |---|---|---|---|
@@ -129,12 +129,12 @@ struct Run {
     voxels: usize,
     pass: PotentialPass,
     pass_buffer: Buffer,
-    /// The potential, and that of the iteration under way.
+    /// The potential, and the potential of the iteration under way.
     now: Buffer,
     next: Buffer,
     change: Buffer,
     reduction: Reduction,
-    /// How many planes fit in a slice.
+    /// The number of planes in a slice.
     slice_length: SliceLength,
     done: u64,
     total: u64,
@@ -162,7 +162,7 @@ impl Run {
         })
     }
 
-    /// Planes of the iteration under way, as many as fit in `slice`: a launch is bounded, and the next one goes on where it ended.
+    /// Computes planes of the iteration under way, as many as fit in `slice`. A launch is bounded, and the next one continues from its end.
     fn planes(&mut self, device: &mut Device, slice: Duration) -> Result<Duration> {
         let [wide, high, deep] = self.parameters.grid;
         let fit =
@@ -176,7 +176,7 @@ impl Run {
         Ok(took)
     }
 
-    /// The iteration is over: the host sees how much it has changed, and decides.
+    /// Ends an iteration: the host reads its change, and decides.
     fn end_iteration(&mut self, device: &Device) -> Result<()> {
         std::mem::swap(&mut self.now, &mut self.next);
         (self.pass.first_plane, self.done) = (0, self.done + 1);
