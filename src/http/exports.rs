@@ -5,7 +5,7 @@ use std::sync::Arc;
 use axum::Json;
 use axum::body::Body;
 use axum::extract::{Query, State};
-use axum::http::{HeaderMap, Request, StatusCode, header};
+use axum::http::{Request, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -52,7 +52,6 @@ pub(super) async fn file(
     State(app): State<App>,
     Id(id): Id,
     query: std::result::Result<Query<FileQuery>, axum::extract::rejection::QueryRejection>,
-    _: HeaderMap,
 ) -> Result<Response> {
     let job = app.export(&id)?;
     let Query(FileQuery { wait }) = query.map_err(|e| Error::Malformed(e.body_text()))?;

@@ -33,6 +33,8 @@ impl Job {
         if progress.state.is_terminal() {
             return;
         }
+        let warnings = file.result["warnings"].as_array();
+        progress.warnings.extend(warnings.into_iter().flatten().cloned());
         progress.result = Some(file.result.clone());
         progress.file = Some(Arc::new(file));
         progress.state = State::Done;

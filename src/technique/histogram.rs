@@ -4,7 +4,8 @@
 //! Journal of Radiation Oncology 21(1), 1991): the part of the volume that has at least a value.
 //!
 //! The range is divided into equal bins. A voxel's bin is found in single precision, so a value within rounding of an edge may be counted on either
-//! side; the highest value belongs to the last bin. Voxels below or above the range, and NaN voxels, are counted apart.
+//! side; the highest value belongs to the last bin. Voxels below or above the range, and NaN voxels, are counted apart. A
+//! warning tells if bins are narrower than the rounding.
 //!
 //! | parameter | unit | range | default |
 //! |---|---|---|---|
@@ -33,7 +34,7 @@ use crate::device_struct;
 use crate::error::{Error, Result};
 use crate::request;
 use crate::volume::{Volume, VoxelType};
-use process::Run;
+use process::{PER_ITEM, Run};
 
 /// The technique's line in the list.
 pub const TECHNIQUE: Technique = Technique {
@@ -127,6 +128,19 @@ impl Parameters {
         let half = if low == high { (0.5 * low.abs()).max(if low == 0.0 { 0.5 } else { 0.0 }) } else { 0.0 };
         [low - half, high + half]
     }
+
+    /// The kernel's parameters for a volume, before its first launch.
+    fn pass(&self, volume: &Volume) -> HistogramPass {
+        let raw = self.range_of(volume).map(|value| (value - volume.inter()) / volume.slope());
+        HistogramPass {
+            first: 0,
+            end: volume.voxels().len() as u32,
+            per_item: PER_ITEM,
+            bins: self.bins as i32,
+            low: raw[0] as f32,
+            per_raw: (f64::from(self.bins) / (raw[1] - raw[0])) as f32,
+        }
+    }
 }
 
 impl Export for Parameters {
@@ -139,13 +153,18 @@ impl Export for Parameters {
                 limit: format!("{most} voxels"),
             });
         }
+        let pass = self.pass(volume);
+        if !(pass.low.is_finite() && pass.per_raw.is_normal()) {
+            let detail = "single precision cannot tell its bins apart";
+            return Err(Error::invalid("/histogram/range", detail, "a range that is wider, or nearer to the volume's"));
+        }
         Ok(vec![variant(volume.voxel_type())])
     }
 
     fn begin(&self, device: &mut Device, seen: OnDevice) -> Result<Box<dyn Process<Look = File>>> {
         let volume = seen.subject.needed_volume()?.clone();
         let voxels = seen.voxels.ok_or_else(|| Error::internal("a volume that is not on the device"))?;
-        let range = self.range_of(&volume);
-        Ok(Box::new(Run::new(device, volume, voxels, self.bins, range)?))
+        let (range, pass) = (self.range_of(&volume), self.pass(&volume));
+        Ok(Box::new(Run::new(device, volume, voxels, range, pass)?))
     }
 }

@@ -62,7 +62,11 @@ impl House {
     /// The shared house, with the device's own number of lanes.
     pub fn shared() -> &'static Self {
         static HOUSE: OnceLock<House> = OnceLock::new();
-        HOUSE.get_or_init(|| Self::on(DeviceConfig::pocl()))
+        HOUSE.get_or_init(|| {
+            // Its kernels are compiled by processes beside it, on all cores; a part of a test compiles its own.
+            let beside = (!super::processes::is_part()).then(|| env!("CARGO_BIN_EXE_cloudchamber").into());
+            Self::on(DeviceConfig { compiler: beside, ..DeviceConfig::pocl() })
+        })
     }
 
     /// A shared house with `lanes` lanes.

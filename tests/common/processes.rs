@@ -33,6 +33,11 @@ pub fn under_oclgrind(test: &str, work: impl FnOnce()) -> String {
     std::fs::read_to_string(log).unwrap_or_default()
 }
 
+/// True in the process of a part.
+pub fn is_part() -> bool {
+    std::env::var_os(PART).is_some()
+}
+
 /// Does `work` for every part of the test with this name, all at once.
 pub fn in_processes(test: &str, parts: &[&str], work: impl FnOnce(&str)) {
     if let Ok(part) = std::env::var(PART) {

@@ -1,6 +1,8 @@
 //! `histogram` against counts in double precision, a closed form, and the values that are counted apart.
 
+use cloudchamber::error::Error;
 use cloudchamber::job::State;
+use cloudchamber::render::ExportTask;
 use cloudchamber::volume::RawQuery;
 use serde_json::{Value, json};
 
@@ -105,6 +107,22 @@ fn values_that_fall_as_voxels_rise_are_in_the_bins_of_their_values() {
     // A value on an edge may be on either side.
     let apart: f64 = rows.iter().zip(expected).map(|(row, n)| (row[2] - n).abs()).sum();
     assert!(apart <= 0.02 * (nx * ny * nz) as f64, "{rows:?} {expected:?}");
+}
+
+#[test]
+fn bins_that_single_precision_cannot_tell_apart_are_refused_or_warned_of() {
+    let job = House::shared()
+        .export(&json!({"technique": "histogram", "volume": {"builtin": "gaussian", "resolution": 16},
+        "histogram": {"bins": 65536, "range": [0.999, 1.0]}}));
+    let resource = job.resource();
+    for warnings in [&resource["warnings"], &resource["result"]["warnings"]] {
+        assert_eq!(warnings[0]["code"], "narrow_bins", "{resource}");
+    }
+    let house = House::shared();
+    let volume = house.floats([4; 3], |x, _, _| x);
+    let narrow = json!({"technique": "histogram", "volume": volume, "histogram": {"range": [0, 1e-45]}});
+    let refused = ExportTask::from_json(&narrow, house.assets(), house.service.limits());
+    assert!(matches!(refused, Err(Error::Invalid(v)) if v[0].pointer == "/histogram/range"));
 }
 
 #[test]

@@ -14,7 +14,7 @@ use crate::technique::{File, Process, Progress, Step};
 use crate::volume::Volume;
 
 /// Voxels of a work-item.
-const PER_ITEM: u32 = 4096;
+pub(super) const PER_ITEM: u32 = 4096;
 /// Counts behind those of the bins: below the range, above it, NaN.
 const OTHERS: usize = 3;
 
@@ -32,17 +32,14 @@ pub(super) struct Run {
 
 impl Run {
     /// Allocates the counts.
-    pub fn new(device: &Device, volume: Arc<Volume>, voxels: Rc<Buffer>, bins: u32, range: [f64; 2]) -> Result<Self> {
-        let raw = range.map(|value| (value - volume.inter()) / volume.slope());
-        let pass = HistogramPass {
-            first: 0,
-            end: volume.voxels().len() as u32,
-            per_item: PER_ITEM,
-            bins: bins as i32,
-            low: raw[0] as f32,
-            per_raw: (f64::from(bins) / (raw[1] - raw[0])) as f32,
-        };
-        let bins = bins as usize;
+    pub fn new(
+        device: &Device,
+        volume: Arc<Volume>,
+        voxels: Rc<Buffer>,
+        range: [f64; 2],
+        pass: HistogramPass,
+    ) -> Result<Self> {
+        let bins = pass.bins as usize;
         Ok(Self {
             pass_buffer: device.allocate(size_of::<HistogramPass>())?,
             counts: device.upload(&vec![0; 4 * (bins + OTHERS)], 0)?,
@@ -53,6 +50,15 @@ impl Run {
             range,
             pass,
         })
+    }
+
+    /// A warning if bins are narrower than the rounding of single precision, by which voxels are put into them.
+    fn warnings(&self) -> Vec<Value> {
+        let largest = self.range.iter().map(|v| v.abs()).fold(0.0, f64::max);
+        let (width, rounding) = ((self.range[1] - self.range[0]) / self.bins as f64, f64::from(f32::EPSILON) * largest);
+        let message = "bins are narrower than the rounding of single precision: a voxel may be in a bin nearby";
+        let warning = json!({"code": "narrow_bins", "message": message, "measured": width, "bound": rounding});
+        (width < rounding).then_some(warning).into_iter().collect()
     }
 
     /// The table as CSV.
@@ -74,7 +80,7 @@ impl Run {
     fn result(&self, counts: &[u32]) -> Value {
         let [below, above, no_number] = [0, 1, 2].map(|i| counts[self.bins + i]);
         json!({"bins": self.bins, "range": self.range, "voxels": self.pass.end, "below": below, "above": above,
-            "not_a_number": no_number, "unit": self.volume.unit()})
+            "not_a_number": no_number, "unit": self.volume.unit(), "warnings": self.warnings()})
     }
 }
 
