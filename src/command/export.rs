@@ -6,11 +6,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 
 use super::client::Client;
-use super::{insert, read_json};
-use crate::config::{DeviceArgs, Limits};
+use super::{Worker, insert, read_json};
 use crate::error::{Error, Result};
 use crate::job::State;
-use crate::service::Service;
 
 /// What `export` is told.
 #[derive(clap::Args)]
@@ -23,16 +21,8 @@ pub(super) struct Arguments {
     /// Volume file to export, in place of the request's volume
     #[arg(long)]
     volume: Option<PathBuf>,
-    /// Let the server at this URL do it
-    #[arg(long, env = "CLOUDCHAMBER_SERVER")]
-    server: Option<String>,
-    /// Bearer token for that server
-    #[arg(long, env = "CLOUDCHAMBER_TOKEN", hide_env_values = true)]
-    token: Option<String>,
     #[command(flatten)]
-    pub device: DeviceArgs,
-    #[command(flatten)]
-    limits: Limits,
+    pub by: Worker,
 }
 
 /// Makes a file and writes it.
@@ -43,7 +33,7 @@ pub(super) async fn export(args: &Arguments) -> Result<()> {
     let request = read_json(&args.request)?;
     let style = ProgressStyle::with_template("{bar:30} {percent}%  {msg}  {elapsed}");
     let bar = ProgressBar::new(0).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    let (bytes, resource) = match &args.server {
+    let (bytes, resource) = match &args.by.server {
         Some(server) => export_there(args, server, request, &bar).await?,
         None => export_here(args, request, &bar).await?,
     };
@@ -66,7 +56,7 @@ async fn export_there(
     mut request: Value,
     bar: &ProgressBar,
 ) -> Result<(Vec<u8>, Value)> {
-    let client = Client::new(server, args.token.clone())?;
+    let client = Client::new(server, args.by.token.clone())?;
     if let Some(path) = &args.volume {
         request["volume"] = json!({"id": client.upload(path).await?});
     }
@@ -75,7 +65,7 @@ async fn export_there(
 
 /// Runs the same code as the server, without the server.
 async fn export_here(args: &Arguments, mut request: Value, bar: &ProgressBar) -> Result<(Vec<u8>, Value)> {
-    let service = Service::start(args.device.device_config(), &args.device.data_dir(), args.limits.clone())?;
+    let service = args.by.service()?;
     if let Some(path) = &args.volume {
         request["volume"] = insert(&service, path)?;
     }

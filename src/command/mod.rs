@@ -13,7 +13,7 @@ use std::path::Path;
 use clap::{Parser, Subcommand};
 use serde_json::{Value, json};
 
-use crate::config::{Config, DeviceArgs};
+use crate::config::{Config, DeviceArgs, Limits};
 use crate::device;
 use crate::error::{Error, Result};
 use crate::run::compile_kernels;
@@ -50,6 +50,31 @@ enum Command {
     },
 }
 
+/// Who does the work of a command: a server, or this process with its device.
+#[derive(clap::Args)]
+struct Worker {
+    /// Let the server at this URL do it
+    #[arg(long, env = "CLOUDCHAMBER_SERVER")]
+    server: Option<String>,
+    /// Bearer token for that server
+    #[arg(long, env = "CLOUDCHAMBER_TOKEN", hide_env_values = true)]
+    token: Option<String>,
+    #[command(flatten)]
+    device: DeviceArgs,
+    #[command(flatten)]
+    limits: Limits,
+}
+
+impl Worker {
+    /// A service in this process.
+    ///
+    /// # Errors
+    /// Those of [`Service::start`].
+    fn service(&self) -> Result<Service> {
+        Service::start(self.device.device_config(), &self.device.data_dir(), self.limits.clone())
+    }
+}
+
 /// The JSON of a file, or of standard input for `-`.
 fn read_json(path: &Path) -> Result<Value> {
     let text =
@@ -74,8 +99,8 @@ pub fn run(arguments: Arguments) -> Result<()> {
     // PoCL reads its cache folder from the environment, so this comes before any other thread is there.
     let device = match &command {
         Command::Serve(config) => Some(&config.device),
-        Command::Render(args) => Some(&args.device),
-        Command::Export(args) => Some(&args.device),
+        Command::Render(args) => Some(&args.by.device),
+        Command::Export(args) => Some(&args.by.device),
         Command::Study(args) => Some(&args.device),
         Command::Device(args) => Some(&args.device),
         Command::Compile(device) => Some(&**device),

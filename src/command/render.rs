@@ -6,11 +6,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 
 use super::client::Client;
-use super::{insert, read_json};
-use crate::config::{DeviceArgs, Limits};
+use super::{Worker, insert, read_json};
 use crate::error::{Error, Result};
 use crate::job::State;
-use crate::service::Service;
 
 /// What `render` is told.
 #[derive(clap::Args)]
@@ -23,16 +21,8 @@ pub(super) struct Arguments {
     /// Volume file to look at, in place of the scene's volume
     #[arg(long)]
     volume: Option<PathBuf>,
-    /// Let the server at this URL do it
-    #[arg(long, env = "CLOUDCHAMBER_SERVER")]
-    server: Option<String>,
-    /// Bearer token for that server
-    #[arg(long, env = "CLOUDCHAMBER_TOKEN", hide_env_values = true)]
-    token: Option<String>,
     #[command(flatten)]
-    pub device: DeviceArgs,
-    #[command(flatten)]
-    limits: Limits,
+    pub by: Worker,
 }
 
 impl Arguments {
@@ -53,7 +43,7 @@ fn bar(scene: &Value) -> ProgressBar {
 /// Those of the scene, of its file, and of the server if one is named.
 pub(super) async fn render(args: &Arguments) -> Result<()> {
     let mut scene = read_json(&args.scene)?;
-    let (bytes, report) = match &args.server {
+    let (bytes, report) = match &args.by.server {
         Some(server) => render_there(args, server, &mut scene).await?,
         None => render_here(args, &mut scene).await?,
     };
@@ -70,7 +60,7 @@ pub(super) async fn render(args: &Arguments) -> Result<()> {
 }
 
 async fn render_there(args: &Arguments, server: &str, scene: &mut Value) -> Result<(Vec<u8>, Value)> {
-    let client = Client::new(server, args.token.clone())?;
+    let client = Client::new(server, args.by.token.clone())?;
     if let Some(path) = &args.volume {
         scene["volume"] = json!({"id": client.upload(path).await?});
     }
@@ -88,7 +78,7 @@ async fn render_there(args: &Arguments, server: &str, scene: &mut Value) -> Resu
 
 /// Runs the same code as the server, without the server.
 async fn render_here(args: &Arguments, scene: &mut Value) -> Result<(Vec<u8>, Value)> {
-    let service = Service::start(args.device.device_config(), &args.device.data_dir(), args.limits.clone())?;
+    let service = args.by.service()?;
     if let Some(path) = &args.volume {
         scene["volume"] = insert(&service, path)?;
     }
