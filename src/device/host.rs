@@ -20,6 +20,20 @@ pub fn give_way() {
     unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, 5) };
 }
 
+/// Runs a file that was written just now. A process that another thread starts meanwhile holds it open for writing until its own program begins, as
+/// in tests; until then nobody may run it.
+fn run_when_free(file: &Path) -> std::io::Result<std::process::ExitStatus> {
+    const TRIES: usize = 100;
+    let is_busy = |e: &std::io::Error| e.kind() == std::io::ErrorKind::ExecutableFileBusy;
+    for _ in 1..TRIES {
+        match std::process::Command::new(file).status() {
+            Err(e) if is_busy(&e) => std::thread::sleep(std::time::Duration::from_millis(5)),
+            other => return other,
+        }
+    }
+    std::process::Command::new(file).status()
+}
+
 /// Sets the folder of PoCL's compiled kernels to `cache`, unless the environment names one already, and checks that code in it can be run: PoCL
 /// itself would crash later. Call it before any thread is started and before OpenCL is first used.
 ///
@@ -32,7 +46,7 @@ pub fn keep_compiled_kernels_in(cache: &Path) -> Result<()> {
     let probe = cache.join(format!("probe-{}", std::process::id()));
     std::fs::write(&probe, "#!/bin/sh\nexit 0\n").map_err(said)?;
     let runs = std::fs::set_permissions(&probe, std::os::unix::fs::PermissionsExt::from_mode(0o700))
-        .and_then(|()| std::process::Command::new(&probe).status());
+        .and_then(|()| run_when_free(&probe));
     std::fs::remove_file(&probe).map_err(said)?;
     if let Err(cause) = runs {
         return Err(Error::internal(format!(
