@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 use super::bench::{Bench, Reads, Run};
 use super::measure::{measure, median};
 use crate::error::Result;
+use crate::technique;
 
 /// The truth's noise as a part of the error asked for: of evenly spread samples, and of random ones.
 const TRUTH_NOISE: [f64; 2] = [0.2, 0.5];
@@ -43,14 +44,16 @@ pub(super) fn with_samples(request: &Value, samples: u64) -> Value {
 
 /// The truth: renders of the reference setting with other random numbers at other places, until their mean is known well enough. The values
 /// are the means of 2 × 2 pixels of a picture twice as large each way, by two seeds. The difference of the two tells the random error of
-/// their mean. The error of the places is common to both, and it is not taken off. Paths use weighted tracking.
+/// their mean. The error of the places is common to both, and it is not taken off. A technique may have parameters of its own for a truth.
 pub(super) fn truth(bench: &Bench, reference: &Value, asked: f64) -> Result<Known> {
     let mut request = reference.clone();
     for side in ["width", "height"] {
         request["image"][side] = json!(2 * reference["image"][side].as_u64().unwrap_or(0));
     }
-    if request["technique"] == "volume_path" {
-        request["volume_path"]["tracking"] = json!("weighted");
+    if let Some(technique) = request["technique"].as_str().and_then(technique::find) {
+        for (field, value) in (technique.cases)().truth {
+            request[technique.name][field] = value;
+        }
     }
     let mut samples = 8;
     loop {

@@ -1,6 +1,6 @@
 //! The tests of a technique. It lists its own cases, and the tests go through the list of techniques.
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 /// A technique's own parameters for a test. A view's run on volumes of every voxel type. Instead of an id they name a volume of the tests: `{"test":
 /// "labels"}`.
@@ -19,12 +19,14 @@ impl From<Value> for Case {
 }
 
 /// All cases of a technique.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Cases {
     /// The cases. Together they run every variant of its kernels, and no other.
     pub all: Vec<Case>,
     /// Requests of a few pixels and photons that reach all parts of its kernels. An interpreter of OpenCL checks their accesses to memory.
     pub tiny: Vec<Value>,
+    /// Parameters with which the study renders a truth, in place of a request's: the same picture, known sooner.
+    pub truth: Map<String, Value>,
 }
 
 /// The parameters with each interpolation in turn.

@@ -140,11 +140,19 @@ fn all_techniques_voxel_types_and_features_are_in_the_list() {
 
 /// The place of a part of a request. Parts that may stand in several places have one place, which starts with the name that they share.
 fn place(at: &str) -> String {
-    let at = at.replace("/photon_transport/labels", "/photon_transport/density");
-    let shared = ["/phase", "/attenuation", "/single_scatter/lights", "/volume_path/lights", "/lights"];
-    let shared = shared.iter().chain(&["/single_scatter/medium", "/volume_path/medium", "/medium"]);
-    let found = shared.filter(|_| !at.contains("/light/")).find_map(|part| at.rfind(part));
-    found.map_or(at.clone(), |start| at[start..].replace("/single_scatter", "").replace("/volume_path", ""))
+    // A technique's own section that it shares with others is theirs.
+    let mut at = at.to_owned();
+    for technique in technique::all() {
+        for section in technique.shares {
+            at = at.replace(&format!("/{}/{section}", technique.name), &format!("/{section}"));
+        }
+    }
+    // The parts of labels and of densities are a volume's.
+    at = at.replace("/labels/", "/density/");
+    let shared = technique::all().flat_map(|t| t.shares).map(|section| format!("/{section}/"));
+    let parts = ["/phase".to_owned(), "/attenuation".to_owned()].into_iter().chain(shared);
+    let found = parts.filter_map(|part| at.rfind(&part)).max();
+    found.filter(|_| !at.contains("/light/")).map_or(at.clone(), |start| at[start..].to_owned())
 }
 
 /// Every field that a schema permits, and every word that a field may be.

@@ -12,5 +12,6 @@ pub(super) fn cases() -> Cases {
         all.push(json!({"shading": shading, "order": "back_to_front"}).into());
         all.push(json!({"shading": shading, "pre_integrated": true}).into());
     }
-    Cases { all, tiny: vec![tiny(TECHNIQUE.name, "sphere", 12, 2, &json!({"shading": true}))] }
+    let tiny = vec![tiny(TECHNIQUE.name, "sphere", 12, 2, &json!({"shading": true}))];
+    Cases { all, tiny, ..Cases::default() }
 }

@@ -15,5 +15,5 @@ pub(super) fn cases() -> Cases {
         tiny(TECHNIQUE.name, "sphere", 12, 2, &json!({"ambient_occlusion": {"rays": 2}})),
         tiny(TECHNIQUE.name, "gaussian", 8, 1, &layers),
     ];
-    Cases { all, tiny }
+    Cases { all, tiny, ..Cases::default() }
 }

@@ -17,7 +17,7 @@ pub(super) fn cases() -> Cases {
             }));
         }
     }
-    Cases { all, tiny: tiny() }
+    Cases { all, tiny: tiny(), ..Cases::default() }
 }
 
 /// Parameters with the medium in each place that may have one.

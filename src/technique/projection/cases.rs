@@ -13,5 +13,6 @@ pub(super) fn cases() -> Cases {
             tiny(TECHNIQUE.name, "sphere", 12, 2, &json!({})),
             tiny(TECHNIQUE.name, "sphere", 8, 1, &json!({"mode": "xray"})),
         ],
+        ..Cases::default()
     }
 }

@@ -9,5 +9,5 @@ pub(in crate::technique) fn cases(tiny: Vec<Value>) -> Cases {
     let trackers = ["march", "delta", "weighted"].map(|tracking| json!({"tracking": tracking}));
     let mut all = interpolated(&["nearest", "trilinear"], &trackers);
     all.push(Case { is_even_too: true, own: json!({"tracking": "exact", "interpolation": "nearest"}) });
-    Cases { all, tiny }
+    Cases { all, tiny, ..Cases::default() }
 }

@@ -9,5 +9,6 @@ pub(super) fn cases() -> Cases {
     Cases {
         all: interpolated(&["nearest", "trilinear", "b_spline", "catmull_rom"], &[json!({})]),
         tiny: vec![tiny(TECHNIQUE.name, "sphere", 8, 2, &json!({"thickness": 0.3, "mode": "maximum"}))],
+        ..Cases::default()
     }
 }

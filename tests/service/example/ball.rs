@@ -31,7 +31,7 @@ pub const TECHNIQUE: Technique = Technique {
     example,
     source,
     shares: &[],
-    cases: || Cases { all: vec![json!({}).into()], tiny: vec![example()] },
+    cases: || Cases { all: vec![json!({}).into()], tiny: vec![example()], ..Cases::default() },
     kind: Kind::View { parse, complete: "ball", calibration: None },
 };
 
