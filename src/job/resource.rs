@@ -11,7 +11,10 @@ impl Progress {
     /// The failure in words for a client.
     pub(super) fn failure_words(&self) -> Option<String> {
         self.failure.as_ref().map(|error| match error {
-            Error::Internal(_) => "the render failed on the server".to_owned(),
+            Error::Internal(_) => match &self.task {
+                Task::Picture(_) => "the render failed on the server".to_owned(),
+                Task::File(_) => "the export failed on the server".to_owned(),
+            },
             other => other.to_string(),
         })
     }
