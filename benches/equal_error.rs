@@ -54,7 +54,9 @@ impl Subject {
     fn scan(bench: &Bench, path: &Path) -> Self {
         let id = bench.assets().volumes().insert(std::fs::read(path).unwrap(), "scan", None).unwrap().1;
         let volume: std::sync::Arc<Volume> = bench.assets().volumes().get(&id).unwrap();
-        let Voxels::U8(bytes) = volume.voxels() else { panic!("{}: its voxels are not bytes", path.display()) };
+        let Voxels::U8(bytes) = volume.voxels().unwrap() else {
+            panic!("{}: its voxels are not bytes", path.display())
+        };
         let name = path.file_name().unwrap().to_string_lossy().split('.').next().unwrap().to_lowercase();
         Self { name, bytes: bytes.clone(), dims: volume.dims(), spacing: volume.spacing() }
     }

@@ -1,5 +1,5 @@
-// Sums and extremes of floats. A work-item reduces a block of BLOCK values in their order, and the host sums the blocks in theirs, so that the result
-// is the same for any number of threads and lanes.
+// Sums, extremes and counts of floats. A work-item reduces a block of BLOCK values in their order, and the host sums the blocks in theirs, so that the
+// result is the same for any number of threads and lanes.
 //
 // Sums are compensated (Neumaier, ZAMM 54, 1974): the part that an addition rounds away is kept apart, and fma gives the exact error of a product.
 // Contraction would break this, so it is off.
@@ -47,4 +47,19 @@ kernel void extremes(constant int *count, global const float *a, global float2 *
     for (int i = block.x; i < block.y; i++)
         if (isfinite(a[i])) ends = (float2)(fmin(ends.x, a[i]), fmax(ends.y, a[i]));
     partials[get_global_id(0)] = ends;
+}
+
+// The number of finite values per key. Keys are whole numbers of 32 bits in the order of the values; the upper half of each counts, or the lower
+// half of those whose upper half is `upper`. Neighbours are often equal, so that a run of them is added at once.
+kernel void count_keys(constant int *count, constant int *upper, global const float *a, global uint *counts) {
+    int2 block = block_of(count);
+    uint last = 0, run = 0;
+    for (int i = block.x; i < block.y; i++) {
+        uint bits = as_uint(a[i]), key = bits ^ (bits >> 31 ? 0xffffffffu : 0x80000000u);
+        if (!isfinite(a[i]) || (*upper >= 0 && key >> 16 != (uint)*upper)) continue;
+        uint half_key = *upper >= 0 ? key & 0xffffu : key >> 16;
+        if (half_key != last && run > 0) atomic_add(counts + last, run), run = 0;
+        last = half_key, run++;
+    }
+    if (run > 0) atomic_add(counts + last, run);
 }

@@ -21,9 +21,15 @@ pub trait Asset: Resident + Sized {
     /// [`crate::error::Error::Invalid`] when the bytes are not of this kind; [`crate::error::Error::TooLarge`] above the limits.
     fn read(bytes: &[u8], name: &str, how: Option<Self::How>, limits: &AssetLimits) -> Result<Self>;
     /// Its full description.
-    fn info(&self, id: &str) -> Self::Info;
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Internal`] if its content cannot be read.
+    fn info(&self, id: &str) -> Result<Self::Info>;
     /// Its description in lists.
-    fn brief(&self, id: &str) -> Self::Info;
+    ///
+    /// # Errors
+    /// As [`Asset::info`].
+    fn brief(&self, id: &str) -> Result<Self::Info>;
     /// Its id, if it has one, and its name.
     fn id_and_name(info: &Self::Info) -> (Option<&str>, &str);
     /// The extension of its file, after its content: letters, digits and points.

@@ -88,7 +88,7 @@ impl Assets {
     /// # Errors
     /// As [`Assets::builtin`].
     pub fn builtin_info(&self, name: &str, resolution: usize, seed: u64) -> Result<VolumeInfo> {
-        Ok(VolumeInfo::of_builtin(name, resolution, seed, &*self.builtin(name, resolution, seed)?))
+        VolumeInfo::of_builtin(name, resolution, seed, &*self.builtin(name, resolution, seed)?)
     }
 
     /// The built-ins at their default resolution, then the uploads, oldest first. Nothing is decoded or built.

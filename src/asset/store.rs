@@ -46,7 +46,7 @@ impl<A: Asset> Store<A> {
         let asset = Arc::new(A::read(&bytes, name, how.clone(), &self.limits)?);
         let created = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         let record = Record {
-            info: asset.brief(&id),
+            info: asset.brief(&id)?,
             raw: how,
             extension: asset.extension(&bytes).to_owned(),
             file_bytes: bytes.len() as u64,
@@ -115,7 +115,7 @@ impl<A: Asset> Store<A> {
     /// # Errors
     /// As [`Store::get`].
     pub fn info(&self, id: &str) -> Result<A::Info> {
-        Ok(self.get(id)?.info(id))
+        self.get(id)?.info(id)
     }
 
     /// The uploads, oldest first. Nothing is decoded.

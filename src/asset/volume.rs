@@ -21,12 +21,12 @@ impl Asset for Volume {
         read(bytes, name, how, &limits.volume)
     }
 
-    fn info(&self, id: &str) -> VolumeInfo {
+    fn info(&self, id: &str) -> Result<VolumeInfo> {
         VolumeInfo::of_upload(id, self)
     }
 
-    fn brief(&self, id: &str) -> VolumeInfo {
-        self.info(id).brief()
+    fn brief(&self, id: &str) -> Result<VolumeInfo> {
+        Ok(self.info(id)?.brief())
     }
 
     fn id_and_name(info: &VolumeInfo) -> (Option<&str>, &str) {

@@ -7,8 +7,8 @@ use opencl3::memory::{self as m, Image};
 use opencl3::types::{cl_image_desc, cl_image_format};
 
 use super::{Buffer, Device, Memory, cl};
-use crate::error::Result;
-use crate::volume::{VoxelType, Voxels};
+use crate::error::{Error, Result};
+use crate::volume::VoxelType;
 
 /// The formats of read-only 3D images, by OpenCL's names for the ones in use here and by number for the rest.
 pub(super) fn formats(context: &Context) -> Vec<String> {
@@ -51,16 +51,16 @@ fn channel_type(voxel: VoxelType) -> u32 {
 }
 
 impl Device {
-    /// The voxels as a 3D image of one channel in their own type.
+    /// A copy of voxels as a 3D image of one channel in their own type.
     ///
     /// # Errors
     /// [`crate::error::Error::Internal`] if the device has no room or does not support such an image.
-    pub fn upload_image(&self, voxels: &Voxels, dims: [usize; 3]) -> Result<Buffer> {
-        let bytes = voxels.as_bytes();
-        let format = cl_image_format {
-            image_channel_order: m::CL_R,
-            image_channel_data_type: channel_type(voxels.voxel_type()),
+    pub fn image_of(&self, voxels: &Buffer, voxel: VoxelType, dims: [usize; 3]) -> Result<Buffer> {
+        let bytes = voxel.bytes() * dims.iter().product::<usize>();
+        let (true, Memory::Bytes(from)) = (bytes <= voxels.bytes, &voxels.memory) else {
+            return Err(Error::internal("an image of more voxels than there are, or of an image"));
         };
+        let format = cl_image_format { image_channel_order: m::CL_R, image_channel_data_type: channel_type(voxel) };
         let description = cl_image_desc {
             image_type: m::CL_MEM_OBJECT_IMAGE3D,
             image_width: dims[0],
@@ -73,11 +73,17 @@ impl Device {
             num_samples: 0,
             buffer: ptr::null_mut(),
         };
-        let flags = m::CL_MEM_READ_ONLY | m::CL_MEM_COPY_HOST_PTR;
-        let from = bytes.as_ptr().cast_mut().cast();
-        // SAFETY: format and description live through the call; `from` has the bytes of dims voxels without padding, and OpenCL
-        // copies them during the call and does not write.
-        let image = unsafe { Image::create(&self.context, flags, &format, &description, from) };
-        Ok(Buffer { memory: Memory::Image(cl("making an image", image)?), bytes: bytes.len() })
+        // SAFETY: format and description live through the call, and no host pointer is given.
+        let image =
+            unsafe { Image::create(&self.context, m::CL_MEM_READ_ONLY, &format, &description, ptr::null_mut()) };
+        let mut image = cl("making an image", image)?;
+        let origin = [0usize; 3];
+        // SAFETY: the buffer has the bytes of dims voxels without padding, and both arrays have three elements and live through the call.
+        let copied = unsafe {
+            self.queue.enqueue_copy_buffer_to_image(from, &mut image, 0, origin.as_ptr(), dims.as_ptr(), &[])
+        };
+        cl("copying voxels to an image", copied)?;
+        cl("waiting for the device", self.queue.finish())?;
+        Ok(Buffer { memory: Memory::Image(image), bytes })
     }
 }

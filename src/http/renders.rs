@@ -139,7 +139,7 @@ pub(super) async fn difference(
 pub(super) async fn field(State(app): State<App>, Id(id): Id) -> Result<Response> {
     let job = app.render(&id)?;
     let grid = job.field().ok_or_else(|| Error::NotFound { what: "field of render", id: job.id().into() })?;
-    let bytes = tokio::task::spawn_blocking(move || volume::write_nrrd(&grid)).await.map_err(Error::internal)?;
+    let bytes = tokio::task::spawn_blocking(move || volume::write_nrrd(&grid)).await.map_err(Error::internal)??;
     let disposition = format!("attachment; filename=\"{}.nrrd\"", job.id());
     Ok((
         [(header::CONTENT_TYPE, "application/octet-stream".to_owned()), (header::CONTENT_DISPOSITION, disposition)],

@@ -36,7 +36,7 @@ pub(super) async fn create(State(app): State<App>, request: Request<Body>) -> Re
         .map_err(Error::internal)??;
     let location = format!("/v1/volumes/{id}");
     let status = if new { StatusCode::CREATED } else { StatusCode::OK };
-    Ok((status, [(header::LOCATION, location)], Json(VolumeInfo::of_upload(&id, &volume))).into_response())
+    Ok((status, [(header::LOCATION, location)], Json(VolumeInfo::of_upload(&id, &volume)?)).into_response())
 }
 
 /// Refuses the body of a form by its type, since complaints about its bytes would not help.

@@ -150,7 +150,7 @@ impl Scene {
             scene.own = format!("{} {}: {}", setting.technique, self.own, setting.words).into();
         }
         if let (Some(volume), Some(level)) = (self.subject.volume(), setting.level) {
-            scene.subject = self.subject.with_volume(volume.level(level));
+            scene.subject = self.subject.with_volume(volume.level(level)?);
         }
         scene.prepared_for_subject()
     }

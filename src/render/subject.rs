@@ -25,7 +25,7 @@ pub(super) fn of_request(
     let Some(request) = request else {
         return match own {
             Some(bounds) => Ok(Subject::of_bounds(bounds)),
-            None => Ok(at_level(&built_in("smoke", None, None, assets)?, 0)),
+            None => at_level(&built_in("smoke", None, None, assets)?, 0),
         };
     };
     let given = usize::from(request.id.is_some()) + usize::from(request.builtin.is_some()) + request.field.len();
@@ -49,10 +49,10 @@ pub(super) fn of_request(
     }
     let level = request.level.unwrap_or(0) as usize;
     if let Some(id) = &request.id {
-        return Ok(at_level(&assets.volumes().named(id, "/volume/id")?, level));
+        return at_level(&assets.volumes().named(id, "/volume/id")?, level);
     }
     if let Some(name) = &request.builtin {
-        return Ok(at_level(&built_in(name, request.resolution, request.seed, assets)?, level));
+        return at_level(&built_in(name, request.resolution, request.seed, assets)?, level);
     }
     let (name, parameters) = request.field.iter().next().ok_or_else(|| Error::internal("a field without a name"))?;
     let technique = technique::find(name);
@@ -74,8 +74,8 @@ fn within_limits(technique: &Technique, work: Work, parameters: &Value, limits: 
     parameters
 }
 
-fn at_level(volume: &Arc<Volume>, level: usize) -> Subject {
-    Subject::of_volume(volume.clone()).with_volume(volume.level(level))
+fn at_level(volume: &Arc<Volume>, level: usize) -> Result<Subject> {
+    Ok(Subject::of_volume(volume.clone()).with_volume(volume.level(level)?))
 }
 
 fn built_in(name: &str, resolution: Option<u32>, seed: Option<u64>, assets: &Assets) -> Result<Arc<Volume>> {

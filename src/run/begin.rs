@@ -8,12 +8,12 @@ use super::context::DeviceContext;
 use super::field_run::FieldRun;
 use super::live::{Live, Shown, Stage};
 use super::view_run::ViewRun;
-use crate::device::cells;
+use super::volumes::kernels_for;
 use crate::device::program::Variant;
 use crate::error::Result;
 use crate::job::Job;
 use crate::render::Scene;
-use crate::technique::{AskedField, PreparedView};
+use crate::technique::PreparedView;
 use crate::volume::Volume;
 
 impl Live {
@@ -59,14 +59,14 @@ impl Live {
 
     pub(super) fn begin_field(&mut self, context: &mut DeviceContext) -> Result<()> {
         let asked = self.camera.as_ref().and_then(|camera| camera.scene.subject().field().cloned());
-        let Some(AskedField { field, .. }) = asked else { return Ok(()) };
-        if !is_ready(context, &self.job, &field.kernels()?)? {
+        let Some(asked) = asked else { return Ok(()) };
+        if !is_ready(context, &self.job, &FieldRun::kernels(&*asked.field)?)? {
             self.stage = Stage::AwaitsField;
             return Ok(());
         }
         // The time budget covers the work, not the compilation.
         self.started = Instant::now();
-        let run = FieldRun::new(context, &field)?;
+        let run = FieldRun::new(context, &asked)?;
         self.job.set_reasons(run.reasons().to_vec());
         self.field = Some(run);
         self.stage = Stage::Fills;
@@ -82,7 +82,7 @@ impl Live {
 
     pub(super) fn run_view(&mut self, context: &mut DeviceContext, prepared: Arc<dyn PreparedView>) -> Result<()> {
         let mut kernels = vec![prepared.plan().variant];
-        kernels.extend(prepared.volume().into_iter().flat_map(|volume| cells::needed(volume.voxel_type())));
+        kernels.extend(prepared.volume().into_iter().flat_map(|volume| kernels_for(volume)));
         if !is_ready(context, &self.job, &kernels)? {
             self.stage = Stage::AwaitsView(prepared);
             return Ok(());

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 use std::rc::Rc;
-use std::sync::{Arc, Weak};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::compile::Compiler;
@@ -10,22 +10,20 @@ use super::device_volume::DeviceVolume;
 use super::first::first_kernels;
 use super::kernels::Kernels;
 use super::sources;
+use super::volumes::Volumes;
 use super::warm::{is_cached, warm};
-use crate::device::cells::Cells;
 use crate::device::program::Variant;
 use crate::device::{Buffer, Device, DeviceConfig, encode};
 use crate::error::{Error, Result};
+use crate::scene::bounds::Bounds;
 use crate::volume::Volume;
-
-/// The device memory for volumes that no job uses, bytes.
-const IDLE_VOLUME_BYTES: usize = 1 << 30;
 
 /// Everything on the device that outlives a job.
 pub(super) struct DeviceContext {
     pub device: Device,
     /// The curve of sRGB by which films are encoded.
     pub curve: Rc<Buffer>,
-    volumes: HashMap<usize, (Weak<Volume>, Rc<DeviceVolume>)>,
+    volumes: Volumes,
     /// The rays per millisecond of the last pass, by kernel variant.
     speed: HashMap<Variant, f64>,
     kernels: Kernels,
@@ -57,7 +55,7 @@ impl DeviceContext {
                     let (level, ms) = (device.info().level, started.elapsed().as_millis() as u64);
                     tracing::info!(ms, lanes = used, level, "the first kernels are there");
                     device.note_given_up(gave_up);
-                    let (volumes, speed) = (HashMap::new(), HashMap::new());
+                    let (volumes, speed) = Default::default();
                     let curve = encode::curve(&device)?;
                     let mut context = Self { device, curve, volumes, speed, kernels, compiles_ahead: false };
                     context.compile_ahead(config, wake)?;
@@ -126,31 +124,14 @@ impl DeviceContext {
         next.inspect(|variant| self.build(variant)).is_some()
     }
 
-    /// The volume on the device. At first use it is uploaded and its macro-cells are built.
+    /// A volume on the device: [`Volumes::get`].
     pub fn volume(&mut self, volume: &Arc<Volume>) -> Result<Rc<DeviceVolume>> {
-        let key = Arc::as_ptr(volume) as usize;
-        if let Some((weak, buffer)) = self.volumes.get(&key)
-            && weak.strong_count() > 0
-        {
-            return Ok(buffer.clone());
-        }
-        let voxels = self.device.upload(volume.voxels().as_bytes(), 8)?;
-        let cells = Cells::new(&mut self.device, &voxels, volume.dims(), volume.voxel_type())?;
-        let [wide, high, deep] = volume.dims();
-        let most = self.device.info().largest_image_3d;
-        let fits = wide <= most[0] && high <= most[1] && deep <= most[2];
-        let voxels = if self.device.info().volumes_are_images {
-            if !fits {
-                return Err(Error::internal(format!("the device takes images of at most {most:?} voxels")));
-            }
-            self.device.upload_image(volume.voxels(), volume.dims())?
-        } else {
-            voxels
-        };
-        let on_device = Rc::new(DeviceVolume::new(voxels, cells));
-        self.volumes.insert(key, (Arc::downgrade(volume), on_device.clone()));
-        self.tidy();
-        Ok(on_device)
+        self.volumes.get(&mut self.device, volume)
+    }
+
+    /// The volume of a field's grid: [`Volumes::of_field`].
+    pub fn grid(&mut self, voxels: Buffer, bounds: &Bounds, technique: &str) -> Result<Arc<Volume>> {
+        self.volumes.of_field(&self.device, voxels, bounds, technique)
     }
 
     /// Notes the speed of a variant, from the rays of a pass and their time.
@@ -163,15 +144,8 @@ impl DeviceContext {
         self.speed.get(variant).copied()
     }
 
-    /// Drops volumes that are gone from the host, and idle volumes past the limit.
+    /// Drops volumes that nobody needs: [`Volumes::tidy`].
     pub fn tidy(&mut self) {
-        self.volumes.retain(|_, (weak, _)| weak.strong_count() > 0);
-        let idle = |v: &Rc<DeviceVolume>| Rc::strong_count(v) == 1;
-        let mut bytes: usize = self.volumes.values().filter(|(_, v)| idle(v)).map(|(_, v)| v.bytes()).sum();
-        self.volumes.retain(|_, (_, volume)| {
-            let drop = bytes > IDLE_VOLUME_BYTES && idle(volume);
-            bytes -= if drop { volume.bytes() } else { 0 };
-            !drop
-        });
+        self.volumes.tidy();
     }
 }

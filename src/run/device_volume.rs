@@ -36,7 +36,7 @@ impl<K: PartialEq, V: Clone> Kept<K, V> {
 
 /// A volume on the device.
 pub(super) struct DeviceVolume {
-    pub voxels: Rc<Buffer>,
+    pub voxels: Arc<Buffer>,
     pub cells: Cells,
     /// Distances by intervals of raw values and by the overshoot, as bits.
     distances: Kept<(Vec<[u32; 2]>, u32), Distances>,
@@ -52,8 +52,8 @@ pub(super) struct Distances {
 }
 
 impl DeviceVolume {
-    pub fn new(voxels: Buffer, cells: Cells) -> Self {
-        Self { voxels: Rc::new(voxels), cells, distances: Kept(RefCell::default()), tables: Kept(RefCell::default()) }
+    pub fn new(voxels: Arc<Buffer>, cells: Cells) -> Self {
+        Self { voxels, cells, distances: Kept(RefCell::default()), tables: Kept(RefCell::default()) }
     }
 
     pub fn bytes(&self) -> usize {

@@ -7,6 +7,7 @@ use super::begin::is_ready;
 use super::context::DeviceContext;
 use super::field_run::FieldRun;
 use super::live::{FIELD_SLICE, Turn};
+use super::volumes::kernels_for;
 use crate::error::Result;
 use crate::job::Job;
 use crate::render::ExportTask;
@@ -63,10 +64,10 @@ impl ExportRun {
 
     fn begin_field(&mut self, context: &mut DeviceContext) -> Result<Turn> {
         let Some(asked) = self.task.subject().field() else { return Ok(Turn::Over) };
-        if !is_ready(context, &self.job, &asked.field.kernels()?)? {
+        if !is_ready(context, &self.job, &FieldRun::kernels(&*asked.field)?)? {
             return Ok(Turn::Waits);
         }
-        let run = FieldRun::new(context, &asked.field)?;
+        let run = FieldRun::new(context, asked)?;
         self.job.set_reasons(run.reasons().to_vec());
         self.stage = Stage::Fills(Box::new(run));
         Ok(Turn::Again)
@@ -87,7 +88,9 @@ impl ExportRun {
     }
 
     fn begin_process(&mut self, context: &mut DeviceContext, subject: Subject) -> Result<Turn> {
-        if !is_ready(context, &self.job, &self.task.export().kernels(&subject)?)? {
+        let mut kernels = self.task.export().kernels(&subject)?;
+        kernels.extend(subject.volume().into_iter().flat_map(|volume| kernels_for(volume)));
+        if !is_ready(context, &self.job, &kernels)? {
             return Ok(Turn::Waits);
         }
         let voxels = subject.volume().map(|volume| context.volume(volume)).transpose()?.map(|v| v.voxels.clone());

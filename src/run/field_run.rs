@@ -6,14 +6,20 @@ use std::time::Duration;
 use serde_json::Value;
 
 use super::context::DeviceContext;
+use crate::device::grid;
+use crate::device::program::Variant;
 use crate::error::Result;
 use crate::film::Film;
-use crate::technique::{Field, Look, Process, Step};
+use crate::scene::bounds::Bounds;
+use crate::technique::{AskedField, Field, Look, Process, Step};
 use crate::volume::Volume;
 
 /// A field at work.
 pub(super) struct FieldRun {
     process: Box<dyn Process<Look = Look>>,
+    /// The box of its grid, and the technique's name.
+    bounds: Bounds,
+    technique: &'static str,
     reasons: Vec<String>,
     is_over: bool,
     /// The `result` of the reply, as of the last look.
@@ -26,10 +32,20 @@ pub(super) struct FieldRun {
 }
 
 impl FieldRun {
+    /// The kernels of a field and of looks at it.
+    ///
+    /// # Errors
+    /// As [`Field::kernels`].
+    pub fn kernels(field: &dyn Field) -> Result<Vec<Variant>> {
+        Ok(field.kernels()?.into_iter().chain(grid::needed()).collect())
+    }
+
     /// Begins a field whose kernels are built.
-    pub fn new(context: &mut DeviceContext, field: &Arc<dyn Field>) -> Result<Self> {
+    pub fn new(context: &mut DeviceContext, AskedField { field, technique, .. }: &AskedField) -> Result<Self> {
         Ok(Self {
             process: field.begin(&mut context.device)?,
+            bounds: field.bounds(),
+            technique,
             reasons: field.reasons(),
             is_over: false,
             result: None,
@@ -62,11 +78,11 @@ impl FieldRun {
         self.process.stop(&mut context.device)
     }
 
-    /// Reads the grid in its present state.
+    /// The grid in its present state. It stays on the device.
     pub fn look(&mut self, context: &mut DeviceContext) -> Result<Arc<Volume>> {
-        let seen = self.process.look(&mut context.device)?;
-        self.result = Some(seen.result);
-        Ok(seen.volume)
+        let Look { voxels, result } = self.process.look(&mut context.device)?;
+        self.result = Some(result);
+        context.grid(voxels, &self.bounds, self.technique)
     }
 
     /// Forgets the picture of half the work, which is from an old camera. The error that was found from there stands in for the new camera's.

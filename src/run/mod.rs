@@ -24,6 +24,7 @@ mod stopping;
 mod tiling;
 mod view_run;
 mod view_turn;
+mod volumes;
 mod warm;
 mod warnings;
 

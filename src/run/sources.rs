@@ -1,14 +1,18 @@
 //! All kernels of this program, and the variants that are compiled before somebody asks for them.
 
 use crate::device::program::{Source, Variant};
-use crate::device::{cells, encode, reduce};
+use crate::device::{cells, encode, grid, reduce};
 use crate::error::{Error, Result};
 use crate::technique;
 use crate::volume::VoxelType;
 
 /// All kernels.
 pub fn sources() -> impl Iterator<Item = Source> {
-    technique::all().map(|t| (t.source)()).chain(cells::sources()).chain([encode::source(), reduce::source()])
+    technique::all().map(|t| (t.source)()).chain(cells::sources()).chain([
+        encode::source(),
+        grid::source(),
+        reduce::source(),
+    ])
 }
 
 /// The source of a variant.

@@ -6,7 +6,7 @@ use super::sources::source_of;
 use crate::device::program::Variant;
 use crate::device::{Buffer, Device, Parameter};
 use crate::error::Result;
-use crate::volume::Voxels;
+use crate::volume::VoxelType;
 
 /// Builds a variant and launches it once on nothing.
 ///
@@ -21,7 +21,7 @@ pub(super) fn warm(device: &mut Device, variant: &Variant) -> Result<()> {
     // Zeroed buffers ask for an image of no pixels or a launch of no histories, so that the kernel is compiled and does nothing.
     let zero = |parameter: &Parameter| -> Result<Buffer> {
         if parameter.is_volume && device.info().volumes_are_images {
-            device.upload_image(&Voxels::U8(vec![0]), [1; 3])
+            device.image_of(&device.upload(&[0], 0)?, VoxelType::U8, [1; 3])
         } else {
             device.upload(&[0; 1024], 0)
         }

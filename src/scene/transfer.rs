@@ -38,22 +38,12 @@ fn span(wish: Option<[f64; 2]>, volume: &Volume, at: &str) -> Result<[f64; 2]> {
         Some([low, _]) => {
             Err(Error::invalid(format!("{at}/value_range/1"), "the range is empty", format!("more than {low}")))
         }
-        None if volume.format() == "field" => Ok([0.0, quantile(volume, 0.998)]),
-        None => Ok(volume.range()),
+        // A millionth of the largest value, so that the range is not empty.
+        None => Ok(volume.upper().map_or(volume.range(), |upper| {
+            let least = (volume.range()[1] * 1e-6).max(f64::MIN_POSITIVE);
+            [0.0, upper.max(least)]
+        })),
     }
-}
-
-/// The `q`-quantile of the finite voxels' values. It is at least a millionth of the largest value, so that the range is not empty.
-fn quantile(volume: &Volume, q: f64) -> f64 {
-    let mut values: Vec<f32> =
-        (0..volume.voxels().len()).map(|i| volume.voxels().get_f32(i)).filter(|v| v.is_finite()).collect();
-    let least = (volume.range()[1] * 1e-6).max(f64::MIN_POSITIVE);
-    if values.is_empty() {
-        return least;
-    }
-    let at = ((values.len() - 1) as f64 * q) as usize;
-    let (_, value, _) = values.select_nth_unstable_by(at, f32::total_cmp);
-    (f64::from(*value) * volume.slope() + volume.inter()).max(least)
 }
 
 impl TransferFunction {

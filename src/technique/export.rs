@@ -1,6 +1,6 @@
 //! Exports: techniques that turn a subject into a file (a table, a mesh, a sinogram), step by step.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use serde_json::Value;
 
@@ -27,7 +27,7 @@ pub struct OnDevice {
     /// The subject, which has no field any more.
     pub subject: Subject,
     /// The voxels of its volume, if it has one: a buffer, or an image if the device samples volumes as images.
-    pub voxels: Option<Rc<Buffer>>,
+    pub voxels: Option<Arc<Buffer>>,
 }
 
 /// An export with valid parameters.

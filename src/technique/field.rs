@@ -8,23 +8,23 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use super::Process;
-use crate::device::Device;
 use crate::device::program::Variant;
+use crate::device::{Buffer, Device};
 use crate::error::Result;
 use crate::scene::bounds::Bounds;
-use crate::volume::Volume;
 
 /// A field as it is between two slices.
 pub struct Look {
-    /// The grid.
-    pub volume: Arc<Volume>,
+    /// The voxels of the field's bounds as floats on the device, x fastest, in memory of [`crate::device::grid::allocate`]. They stay as they are
+    /// while the process goes on.
+    pub voxels: Buffer,
     /// The reply's `result`.
     pub result: Value,
 }
 
 /// A field with valid parameters.
 pub trait Field: Send + Sync {
-    /// The box of its grid.
+    /// The box of its grid, mm, and its voxels.
     fn bounds(&self) -> Bounds;
     /// The kernel variants that its process runs. They are compiled before it begins.
     ///

@@ -93,6 +93,7 @@ fn cases() -> Cases {
     Cases {
         all: vec![Case::from(json!({"bins": 7}))],
         tiny: vec![tiny(json!({"bins": 5, "range": [0.1, 0.6]})), tiny(json!({"bins": 3}))],
+        ..Cases::default()
     }
 }
 
@@ -134,7 +135,7 @@ impl Parameters {
         let raw = self.range_of(volume).map(|value| (value - volume.inter()) / volume.slope());
         HistogramPass {
             first: 0,
-            end: volume.voxels().len() as u32,
+            end: volume.voxel_count() as u32,
             per_item: PER_ITEM,
             bins: self.bins as i32,
             low: raw[0] as f32,
@@ -147,9 +148,9 @@ impl Export for Parameters {
     fn kernels(&self, subject: &Subject) -> Result<Vec<Variant>> {
         let volume = subject.needed_volume()?;
         let most = u64::from(u32::MAX);
-        if volume.voxels().len() as u64 > most {
+        if volume.voxel_count() as u64 > most {
             return Err(Error::TooLarge {
-                what: format!("a volume of {} voxels", volume.voxels().len()),
+                what: format!("a volume of {} voxels", volume.voxel_count()),
                 limit: format!("{most} voxels"),
             });
         }

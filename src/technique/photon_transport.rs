@@ -61,11 +61,10 @@ use crate::device::enums::{DeviceEnum, PhaseKind};
 use crate::device::numbers::define;
 use crate::device::program::{Source, Variant};
 use crate::device::structs::DeviceStruct;
-use crate::device::{Device, Resume};
+use crate::device::{Device, Resume, grid};
 use crate::error::{Error, Result};
 use crate::request;
 use crate::scene::bounds::Bounds;
-use crate::volume::{NewVolume, Voxels};
 use device::{BoundaryKind, LedgerEntry, Media, MediumNumber, STATE_WORDS, SourceKind, Tally};
 pub use device::{FieldPass, PhotonTransport};
 use geometry::Geometry;
@@ -215,7 +214,7 @@ impl Field for Arc<Simulation> {
     }
 
     fn kernels(&self) -> Result<Vec<Variant>> {
-        Ok(vec![self.variant()?])
+        Ok(vec![self.variant()?, grid::OF_SUMS])
     }
 
     fn reasons(&self) -> Vec<String> {
@@ -241,23 +240,9 @@ impl Simulation {
         made.map_or_else(|| self.device_plan(), Ok)
     }
 
-    /// The grid per photon, from the sums of `photons` photons.
-    fn grid(&self, sums: &[u64], photons: u64) -> NewVolume {
+    /// The grid's value per sum of `photons` photons.
+    fn per_photon(&self, photons: u64) -> f64 {
         let [sx, sy, sz] = self.spacing_mm();
-        let scale = 1.0 / (self.deposit_scale() * FIXED_ONE * photons as f64 * sx * sy * sz);
-        let values = sums.iter().map(|&sum| (sum as i64 as f64 * scale) as f32).collect();
-        NewVolume {
-            dims: self.geometry.dims,
-            spacing: self.spacing_mm(),
-            linear: None,
-            voxels: Voxels::F32(values),
-            slope: 1.0,
-            inter: 0.0,
-            name: TECHNIQUE.name.into(),
-            format: "field".into(),
-            file_affine: None,
-            unit: "mm".into(),
-            notes: Vec::new(),
-        }
+        1.0 / (self.deposit_scale() * FIXED_ONE * photons as f64 * sx * sy * sz)
     }
 }

@@ -1,6 +1,6 @@
 //! The mean value along a bright ray of a volume. Projections scale their windows and extinctions by it.
 
-use super::Volume;
+use super::Values;
 
 /// The rays a side and the samples a ray of [`bright_mean`].
 const LOOK_RAYS: usize = 32;
@@ -8,15 +8,14 @@ const LOOK_SAMPLES: usize = 128;
 
 /// The mean of the finite voxels along a bright ray: one in fifty of the rays along the grid's axes is brighter. A mean over the whole
 /// volume would say little of a few vessels in much air.
-pub(super) fn bright_mean(volume: &Volume) -> f64 {
-    let mut means: Vec<f64> = (0..3).flat_map(|axis| means_along(volume, axis)).collect();
+pub(super) fn bright_mean(dims: [usize; 3], values: Values<'_>) -> f64 {
+    let mut means: Vec<f64> = (0..3).flat_map(|axis| means_along(dims, values, axis)).collect();
     means.sort_by(f64::total_cmp);
     means.get(means.len().saturating_sub(1) * 49 / 50).copied().unwrap_or(0.0)
 }
 
 /// The means of the rays along one axis that meet a finite voxel.
-fn means_along(volume: &Volume, axis: usize) -> Vec<f64> {
-    let dims = volume.dims();
+fn means_along(dims: [usize; 3], values: Values<'_>, axis: usize) -> Vec<f64> {
     let (across, down) = ((axis + 1) % 3, (axis + 2) % 3);
     let count = |axis: usize, most: usize| dims[axis].min(most);
     let place = |i: usize, of: usize, n: usize| (2 * i + 1) * n / (2 * of);
@@ -27,7 +26,7 @@ fn means_along(volume: &Volume, axis: usize) -> Vec<f64> {
         let (mut sum, mut found) = (0.0, 0.0);
         for k in 0..samples {
             at[axis] = place(k, samples, dims[axis]);
-            let value = volume.value(at[0], at[1], at[2]);
+            let value = values.at(at[0], at[1], at[2]);
             if value.is_finite() {
                 (sum, found) = (sum + value, found + 1.0);
             }

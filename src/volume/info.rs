@@ -3,6 +3,7 @@
 use super::builtin::{self, Builtin};
 use super::voxels::{Histogram, VoxelType};
 use super::{RawType, Volume};
+use crate::error::Result;
 use glam::DMat4;
 use serde_json::{Value, json};
 
@@ -54,18 +55,23 @@ pub struct VolumeInfo {
 
 impl VolumeInfo {
     /// The description of an uploaded volume.
-    pub fn of_upload(id: &str, volume: &Volume) -> Self {
-        Self { id: Some(id.to_owned()), ..Self::of(volume, json!({ "id": id })) }
+    ///
+    /// # Errors
+    /// As [`Volume::voxels`].
+    pub fn of_upload(id: &str, volume: &Volume) -> Result<Self> {
+        Ok(Self { id: Some(id.to_owned()), ..Self::of(volume, json!({ "id": id }))? })
     }
 
     /// The description of a built-in that was built.
-    pub fn of_builtin(name: &str, resolution: usize, seed: u64, volume: &Volume) -> Self {
-        Self { builtin: Some(name.to_owned()), ..Self::of(volume, builtin_reference(name, resolution, seed)) }
+    ///
+    /// # Errors
+    /// As [`Volume::voxels`].
+    pub fn of_builtin(name: &str, resolution: usize, seed: u64, volume: &Volume) -> Result<Self> {
+        Ok(Self { builtin: Some(name.to_owned()), ..Self::of(volume, builtin_reference(name, resolution, seed))? })
     }
 
-    /// The description of a volume that the service made itself, such as a field; `reference` names it in a request.
-    pub fn of(volume: &Volume, reference: Value) -> Self {
-        Self {
+    fn of(volume: &Volume, reference: Value) -> Result<Self> {
+        Ok(Self {
             reference,
             id: None,
             builtin: None,
@@ -83,8 +89,8 @@ impl VolumeInfo {
             slope: volume.slope(),
             inter: volume.inter(),
             notes: volume.notes().to_vec(),
-            histogram: Some(volume.histogram().clone()),
-        }
+            histogram: Some(volume.histogram()?.clone()),
+        })
     }
 
     /// The description of a built-in at its default resolution, without building it.

@@ -12,6 +12,7 @@ use glam::{DAffine3, DMat3, DVec3};
 use super::parallel::over_slices;
 use super::voxels::{Sample, Voxels, with_slice};
 use super::{NewVolume, Volume};
+use crate::error::Result;
 
 /// The coarsest level that a request may name.
 pub const MOST_LEVEL: usize = 8;
@@ -28,11 +29,13 @@ struct Span {
 impl Volume {
     /// A coarser level, made when it is first asked for and kept as long as the volume. Level 0 is the volume itself; a number beyond the
     /// coarsest level gives the coarsest.
-    pub fn level(self: &Arc<Self>, level: usize) -> Arc<Self> {
-        match level.min(MOST_LEVEL).checked_sub(1) {
-            None => self.clone(),
-            Some(place) => self.levels[place].get_or_init(|| Arc::new(self.averaged(level))).clone(),
-        }
+    ///
+    /// # Errors
+    /// As [`Volume::voxels`].
+    pub fn level(self: &Arc<Self>, level: usize) -> Result<Arc<Self>> {
+        let Some(place) = level.min(MOST_LEVEL).checked_sub(1) else { return Ok(self.clone()) };
+        let (voxels, bright_mean) = (self.voxels()?, self.bright_mean()?);
+        Ok(self.levels[place].get_or_init(|| Arc::new(self.averaged(level, voxels, bright_mean))).clone())
     }
 
     /// The number of voxels along x, y, z of a level.
@@ -46,12 +49,12 @@ impl Volume {
         })
     }
 
-    fn averaged(&self, level: usize) -> Self {
+    fn averaged(&self, level: usize, fine: &Voxels, bright_mean: f64) -> Self {
         let dims = self.level_dims(level);
         let spans = [0, 1, 2].map(|a| spans(self.dims()[a], dims[a]));
         let mut values = vec![0f32; dims.iter().product()];
-        with_slice!(self.voxels(), average, self.dims(), &spans, &mut values);
-        let voxels = match self.voxels() {
+        with_slice!(fine, average, self.dims(), &spans, &mut values);
+        let voxels = match fine {
             Voxels::U8(_) => Voxels::U8(values.iter().map(|v| v.round() as u8).collect()),
             Voxels::I16(_) => Voxels::I16(values.iter().map(|v| v.round() as i16).collect()),
             Voxels::U16(_) => Voxels::U16(values.iter().map(|v| v.round() as u16).collect()),
@@ -66,7 +69,7 @@ impl Volume {
             ..self.parts_with(voxels)
         };
         let world_from_index = DAffine3 { matrix3: matrix3 * DMat3::from_diagonal(scale), translation };
-        Self { bright_mean: OnceLock::from(self.bright_mean()), ..self.derived(parts, world_from_index) }
+        Self { bright_mean: OnceLock::from(bright_mean), ..self.derived(parts, world_from_index) }
     }
 
     /// The parts that a volume made of this one takes over: all but its notes and its place as its file gives it.
@@ -89,9 +92,8 @@ impl Volume {
             Voxels::F32(values) => values.iter().filter(|v| v.is_nan()).count() as u64,
             _ => 0,
         };
-        let (bright_mean, levels, words) = Default::default();
-        let (range, histogram) = (self.range, self.histogram.clone());
-        Self { parts, world_from_index, range, non_finite, histogram, bright_mean, levels, words }
+        let made = Self::of_parts(parts, world_from_index, self.range, non_finite);
+        Self { histogram: self.histogram.clone(), upper: self.upper, ..made }
     }
 
     /// The bytes of the volume, of the levels that were made of it, and of all their words.

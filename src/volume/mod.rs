@@ -7,6 +7,7 @@
 //! **Values** are `raw · slope + inter`. Voxels stay in the type of their file, so that a byte volume takes a byte a voxel on the device
 //! too. Floats are taken as words of 16 bits if a view needs no more (`words.rs`).
 
+mod away;
 mod bright;
 pub mod builtin;
 mod inflate;
@@ -18,13 +19,16 @@ mod nrrd;
 mod nrrd_header;
 mod nrrd_write;
 mod parallel;
+mod place;
 mod range;
 mod raw;
 mod read;
 mod samples;
+mod values;
 mod voxels;
 mod words;
 
+pub use away::{DeviceGrid, GridStatistics};
 pub(crate) use inflate::is_gzip;
 pub use info::VolumeInfo;
 pub use levels::MOST_LEVEL;
@@ -33,15 +37,16 @@ pub use nrrd_write::write_nrrd;
 pub use raw::{RawParams, RawQuery};
 pub use read::{FORMATS, read};
 pub use samples::{Endian, RawType};
+pub use values::Values;
 pub use voxels::{Histogram, VoxelType, Voxels};
+pub use words::WordScale;
 
 use crate::error::{Error, Result};
+use away::Away;
 use glam::{DAffine3, DMat3, DVec3};
+use place::physical_range;
 use range::raw_range;
 use std::sync::OnceLock;
-
-/// Voxel spacings outside of this range are taken for damage; in mm these are a picometre and a thousand kilometres.
-const SPACING_RANGE: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
 
 /// The parts of a volume that a reader or a built-in gives. [`Volume::new`] checks them and derives the rest.
 #[derive(Debug)]
@@ -77,10 +82,14 @@ pub struct Volume {
     world_from_index: DAffine3,
     range: [f64; 2],
     non_finite: u64,
-    histogram: Histogram,
+    histogram: OnceLock<Histogram>,
     bright_mean: OnceLock<f64>,
+    /// The value that few of a field's voxels exceed.
+    upper: Option<f64>,
     levels: levels::Levels,
     words: words::Words,
+    /// The voxels, if they are on the device and not among the parts.
+    away: Option<Away>,
 }
 
 impl Volume {
@@ -88,34 +97,27 @@ impl Volume {
     ///
     /// # Errors
     /// [`Error::Invalid`] if spacing, axes or scaling make no sense; [`Error::Internal`] if voxels do not fit `dims`.
-    pub fn new(mut parts: NewVolume) -> Result<Self> {
+    pub fn new(parts: NewVolume) -> Result<Self> {
         let count = parts.dims.iter().try_fold(1usize, |product, &n| product.checked_mul(n));
         if count != Some(parts.voxels.len()) || parts.voxels.is_empty() {
             return Err(Error::internal(format!("{} voxels for dims {:?}", parts.voxels.len(), parts.dims)));
         }
-        if !(parts.slope.is_finite() && parts.slope != 0.0 && parts.inter.is_finite()) {
-            return Err(Error::invalid(
-                "header:scl_slope",
-                "the scaling is not finite, or zero",
-                "finite, slope not 0",
-            ));
-        }
-        let linear = match parts.linear {
-            Some(linear) => linear,
-            None => DMat3::from_diagonal(DVec3::from_array(parts.spacing)),
-        };
-        parts.spacing = checked_axes(linear, "header:spacing")?;
-        let half = DVec3::from_array(parts.dims.map(|n| n as f64 / 2.0));
-        let world_from_index = DAffine3::from_mat3_translation(linear, -(linear * half));
-
+        let (mut parts, world_from_index) = parts.placed()?;
         let non_finite = parts.voxels.make_finite_or_nan();
         let range = match raw_range(&parts.voxels) {
             Some(raw) => physical_range(raw, parts.slope, parts.inter)?,
             None => [0.0; 2],
         };
         let histogram = Histogram::new(&parts.voxels, parts.slope, parts.inter, range);
-        let (bright_mean, levels, words) = Default::default();
-        Ok(Self { parts, world_from_index, range, non_finite, histogram, bright_mean, levels, words })
+        let made = Self::of_parts(parts, world_from_index, range, non_finite);
+        Ok(Self { histogram: OnceLock::from(histogram), ..made })
+    }
+
+    /// A volume of checked parts; what is not given is found when it is asked for.
+    fn of_parts(parts: NewVolume, world_from_index: DAffine3, range: [f64; 2], non_finite: u64) -> Self {
+        let (histogram, bright_mean, levels, words) = Default::default();
+        let (upper, away) = (None, None);
+        Self { parts, world_from_index, range, non_finite, histogram, bright_mean, upper, levels, words, away }
     }
 
     /// Voxels along x, y, z.
@@ -133,9 +135,17 @@ impl Volume {
         self.spacing().into_iter().fold(f64::INFINITY, f64::min)
     }
 
-    /// The voxels in the type of their file, x fastest, then y, then z.
-    pub fn voxels(&self) -> &Voxels {
-        &self.parts.voxels
+    /// The voxels in the type of their file, x fastest, then y, then z. Those of a field are read from the device when they are first asked for.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] if the device fails.
+    pub fn voxels(&self) -> Result<&Voxels> {
+        self.away.as_ref().map_or(Ok(&self.parts.voxels), Away::voxels)
+    }
+
+    /// The number of voxels.
+    pub fn voxel_count(&self) -> usize {
+        self.dims().iter().product()
     }
 
     /// The type of a voxel.
@@ -145,7 +155,7 @@ impl Volume {
 
     /// Bytes of all voxels.
     pub fn bytes(&self) -> u64 {
-        self.parts.voxels.as_bytes().len() as u64
+        (self.voxel_count() * self.voxel_type().bytes()) as u64
     }
 
     /// value = raw · slope + inter.
@@ -158,14 +168,12 @@ impl Volume {
         self.parts.inter
     }
 
-    /// The value of voxel (x, y, z), scaled; NaN if it has none, or outside of the grid.
-    pub fn value(&self, x: usize, y: usize, z: usize) -> f64 {
-        let [nx, ny, nz] = self.parts.dims;
-        if x >= nx || y >= ny || z >= nz {
-            return f64::NAN;
-        }
-        let raw = f64::from(self.parts.voxels.get_f32(x + nx * (y + ny * z)));
-        raw * self.parts.slope + self.parts.inter
+    /// The values of its voxels.
+    ///
+    /// # Errors
+    /// As [`Volume::voxels`].
+    pub fn values(&self) -> Result<Values<'_>> {
+        Ok(Values { volume: self, voxels: self.voxels()? })
     }
 
     /// World from continuous index: the box `[0, n]` stands centred at the world's origin.
@@ -196,13 +204,29 @@ impl Volume {
     }
 
     /// The histogram of the values.
-    pub fn histogram(&self) -> &Histogram {
-        &self.histogram
+    ///
+    /// # Errors
+    /// As [`Volume::voxels`].
+    pub fn histogram(&self) -> Result<&Histogram> {
+        if let (None, Some(away)) = (self.histogram.get(), &self.away) {
+            let histogram = Histogram::new(away.values()?, 1.0, 0.0, self.range);
+            return Ok(self.histogram.get_or_init(|| histogram));
+        }
+        Ok(self.histogram.get_or_init(|| Histogram::new(&self.parts.voxels, self.slope(), self.inter(), self.range)))
     }
 
     /// The mean of the finite voxels along a bright ray: one in fifty of the rays along the grid's axes is brighter.
-    pub fn bright_mean(&self) -> f64 {
-        *self.bright_mean.get_or_init(|| bright::bright_mean(self))
+    ///
+    /// # Errors
+    /// As [`Volume::voxels`].
+    pub fn bright_mean(&self) -> Result<f64> {
+        let values = self.values()?;
+        Ok(*self.bright_mean.get_or_init(|| bright::bright_mean(self.dims(), values)))
+    }
+
+    /// The value that few voxels of a field exceed, those next to its source ([`GridStatistics::UPPER`]); `None` for other volumes.
+    pub fn upper(&self) -> Option<f64> {
+        self.upper
     }
 
     /// A name for people.
@@ -229,29 +253,4 @@ impl Volume {
     pub fn notes(&self) -> &[String] {
         &self.parts.notes
     }
-}
-
-/// The lengths of the columns, if they are usable as axes of a grid: finite, of sane length, and linearly independent.
-pub(crate) fn checked_axes(linear: DMat3, pointer: &str) -> Result<[f64; 3]> {
-    let lengths = [linear.x_axis.length(), linear.y_axis.length(), linear.z_axis.length()];
-    if !lengths.iter().all(|length| SPACING_RANGE.contains(length)) {
-        let detail = format!("the steps from voxel to voxel have the lengths {lengths:?}");
-        return Err(Error::invalid(pointer, detail, "finite, 1e-9 to 1e9"));
-    }
-    // The volume spanned by the unit axes: 1 for a right-angled grid, 0 if the axes lie in a plane.
-    let independence = linear.determinant().abs() / (lengths[0] * lengths[1] * lengths[2]);
-    if independence.is_nan() || independence < 1e-6 {
-        return Err(Error::invalid(pointer, "the axes of the grid lie in one plane", "three independent axes"));
-    }
-    Ok(lengths)
-}
-
-/// The scaled range. It is refused if a value would leave the range of 32-bit floats on the device.
-fn physical_range(raw: [f64; 2], slope: f64, inter: f64) -> Result<[f64; 2]> {
-    let ends = raw.map(|value| value * slope + inter);
-    if ends.iter().any(|end| !(*end as f32).is_finite()) {
-        let detail = format!("the scaled values reach {:e} and {:e}", ends[0], ends[1]);
-        return Err(Error::invalid("header:scl_slope", detail, "within ±3.4e38"));
-    }
-    Ok([ends[0].min(ends[1]), ends[0].max(ends[1])])
 }

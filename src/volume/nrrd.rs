@@ -3,8 +3,9 @@
 use super::inflate::Source;
 use super::limits::{VolumeLimits, checked_count};
 use super::nrrd_header::{Header, vector};
+use super::place::{SPACING_RANGE, checked_axes};
 use super::samples::{Endian, RawType, decode};
-use super::{NewVolume, SPACING_RANGE, Volume, checked_axes};
+use super::{NewVolume, Volume};
 use crate::error::{Error, Result};
 use glam::{DMat3, DVec3};
 

@@ -1,13 +1,18 @@
 //! The encoding of a volume as NRRD (attached, raw), the reply of `GET …/field`.
 
 use super::{Volume, Voxels};
+use crate::error::Result;
 use glam::DVec3;
 
 /// The NRRD bytes of a volume: its voxels in their own type, little-endian, with the axes and the centre of the first voxel in world units.
 /// Slope and intercept, if any, are not applied; they stand in the header as key/value pairs.
-pub fn write_nrrd(volume: &Volume) -> Vec<u8> {
+///
+/// # Errors
+/// As [`Volume::voxels`].
+pub fn write_nrrd(volume: &Volume) -> Result<Vec<u8>> {
     let [nx, ny, nz] = volume.dims();
-    let kind = match volume.voxels() {
+    let voxels = volume.voxels()?;
+    let kind = match voxels {
         Voxels::U8(_) => "uint8",
         Voxels::I16(_) => "int16",
         Voxels::U16(_) => "uint16",
@@ -30,6 +35,6 @@ pub fn write_nrrd(volume: &Volume) -> Vec<u8> {
         header += &format!("slope:={}\nintercept:={}\n", volume.slope(), volume.inter());
     }
     let mut bytes = (header + "\n").into_bytes();
-    bytes.extend_from_slice(volume.voxels().as_bytes());
-    bytes
+    bytes.extend_from_slice(voxels.as_bytes());
+    Ok(bytes)
 }

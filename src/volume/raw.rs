@@ -2,8 +2,9 @@
 
 use super::inflate::Source;
 use super::limits::{VolumeLimits, checked_count};
+use super::place::SPACING_RANGE;
 use super::samples::{Endian, RawType, decode};
-use super::{NewVolume, SPACING_RANGE, Volume};
+use super::{NewVolume, Volume};
 use crate::error::{Error, Result, Violation};
 
 /// The query parameters as they come; all absent means that the body describes itself.

@@ -6,10 +6,12 @@
 use std::sync::{Arc, OnceLock};
 
 use super::parallel::over_slices;
-use super::{NewVolume, Volume, Voxels};
+use super::{NewVolume, Volume, VoxelType, Voxels};
 
 /// The number of steps of the words over the range.
 const STEPS: f64 = 65535.0;
+/// Voxels that a thread converts at a time.
+const PART: usize = 1 << 16;
 
 /// The volume in words once it was asked for; `None` in it if the volume has no words.
 pub(super) type Words = OnceLock<Option<Arc<Volume>>>;
@@ -18,10 +20,10 @@ impl Volume {
     /// The volume in words, if it has floats, all of them finite, and words whose steps are at most `resolution`, a difference of values.
     /// It is made when it is first asked for and kept as long as the volume.
     pub fn words(&self, resolution: f64) -> Option<Arc<Self>> {
-        let Voxels::F32(values) = self.voxels() else { return None };
         let [low, high] = self.range;
-        let fine = self.non_finite == 0 && high > low && self.word_step() <= resolution;
-        fine.then(|| self.words.get_or_init(|| self.in_words(values)).clone()).flatten()
+        let are_floats = self.voxel_type() == VoxelType::F32;
+        let fine = are_floats && self.non_finite == 0 && high > low && self.word_step() <= resolution;
+        fine.then(|| self.words.get_or_init(|| self.in_words()).clone()).flatten()
     }
 
     /// The difference of the values of two neighbouring words.
@@ -29,24 +31,46 @@ impl Volume {
         (self.range[1] - self.range[0]) / STEPS
     }
 
-    fn in_words(&self, values: &[f32]) -> Option<Arc<Self>> {
+    fn in_words(&self) -> Option<Arc<Self>> {
         let raw = self.range.map(|value| (value - self.inter()) / self.slope());
         let (low, high) = (raw[0].min(raw[1]), raw[0].max(raw[1]));
         let (scale, slope) = ((STEPS / (high - low)) as f32, self.slope() * (high - low) / STEPS);
         if !(scale.is_normal() && slope.is_normal()) {
             return None;
         }
-        let (first, slice) = (low as f32, self.dims()[0] * self.dims()[1]);
+        let scale = WordScale { first: low as f32, per_value: scale };
+        // Words of a grid on the device are made there.
+        let (voxels, away) = match &self.away {
+            Some(away) => (Voxels::U16(Vec::new()), Some(away.in_words(scale))),
+            None => (scale.words(&self.parts.voxels), None),
+        };
+        let inter = self.inter() + self.slope() * low;
+        let parts = NewVolume { slope, inter, notes: self.notes().to_vec(), ..self.parts_with(voxels) };
+        let words = self.derived(parts, self.world_from_index);
+        Some(Arc::new(Self { bright_mean: self.bright_mean.clone(), away, ..words }))
+    }
+}
+
+/// Raw values as words: word = (value − first) per_value, rounded, in single precision.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WordScale {
+    /// The value of word 0.
+    pub first: f32,
+    /// Words per value.
+    pub per_value: f32,
+}
+
+impl WordScale {
+    /// The words of floats; none for voxels that are no floats.
+    pub(super) fn words(self, voxels: &Voxels) -> Voxels {
+        let Voxels::F32(values) = voxels else { return Voxels::U16(Vec::new()) };
         let mut words = vec![0u16; values.len()];
-        over_slices(&mut words, slice, |z, words| {
-            for (word, value) in words.iter_mut().zip(&values[z * slice..]) {
+        over_slices(&mut words, PART, |part, words| {
+            for (word, value) in words.iter_mut().zip(&values[part * PART..]) {
                 // The cast saturates, so that a value that rounding takes past an end becomes the end.
-                *word = ((value - first) * scale + 0.5) as u16;
+                *word = ((value - self.first) * self.per_value + 0.5) as u16;
             }
         });
-        let inter = self.inter() + self.slope() * low;
-        let parts = NewVolume { slope, inter, notes: self.notes().to_vec(), ..self.parts_with(Voxels::U16(words)) };
-        let words = self.derived(parts, self.world_from_index);
-        Some(Arc::new(Self { bright_mean: self.bright_mean.clone(), ..words }))
+        Voxels::U16(words)
     }
 }

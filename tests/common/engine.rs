@@ -13,6 +13,7 @@ use cloudchamber::job::Job;
 use cloudchamber::render::{ExportTask, Scene};
 use cloudchamber::service::Service;
 use cloudchamber::study::bench::Bench;
+use cloudchamber::technique;
 use serde_json::{Value, json};
 
 #[derive(Parser)]
@@ -21,10 +22,13 @@ struct Flags {
     limits: Limits,
 }
 
-/// The kernels of a scene's field, or else of its view.
+/// The kernels of a scene's field that are the technique's own, or else the kernel of its view.
 pub fn kernels_of(scene: &Scene) -> Vec<Variant> {
     match scene.subject().field() {
-        Some(asked) => asked.field.kernels().unwrap(),
+        Some(asked) => {
+            let own = (technique::find(asked.technique).unwrap().source)().kernel;
+            asked.field.kernels().unwrap().into_iter().filter(|variant| variant.kernel == own).collect()
+        }
         None => vec![scene.view().prepare(scene.subject()).unwrap().plan().variant],
     }
 }

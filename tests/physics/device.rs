@@ -4,6 +4,7 @@
 pub(crate) mod builds;
 mod cells;
 mod encode;
+mod grids;
 mod images;
 mod launches;
 mod names;

@@ -100,7 +100,7 @@ fn values_that_fall_as_voxels_rise_are_in_the_bins_of_their_values() {
     let mut expected = [0.0; 4];
     for z in 0..nz {
         for (x, y) in (0..ny).flat_map(|y| (0..nx).map(move |x| (x, y))) {
-            let place = (volume.value(x, y, z) - low) / (high - low) * 4.0;
+            let place = (volume.values().unwrap().at(x, y, z) - low) / (high - low) * 4.0;
             expected[(place as usize).min(3)] += 1.0;
         }
     }

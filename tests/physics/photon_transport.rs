@@ -7,6 +7,7 @@ mod oracle;
 mod phases;
 mod published;
 mod random;
+mod resumed;
 mod run;
 mod threads;
 mod trackers;

@@ -110,7 +110,7 @@ fn a_view_without_a_volume_is_planned_framed_and_turned() {
 fn potential(own: &Value) -> (Vec<f32>, Value) {
     let job = house().finish(&json!({"technique": "slice", "volume": {"potential": own}, "image": {"width": 8, "height": 8}, "budget": {"samples": 1}}));
     let field = job.field().unwrap();
-    ((0..field.voxels().len()).map(|i| field.voxels().get_f32(i)).collect(), job.resource()["result"].clone())
+    ((0..field.voxel_count()).map(|i| field.voxels().unwrap().get_f32(i)).collect(), job.resource()["result"].clone())
 }
 
 #[test]

@@ -74,7 +74,7 @@ fn trial(bench: &Bench, scale: Scale) -> Result<std::result::Result<Trial, Strin
 
 /// The means of the blocks, and their relative standard error.
 fn truth(bench: &Bench, eye: Eye, light: &Light, paths: usize) -> Result<(Vec<f64>, f64)> {
-    let density = Grid::of_volume(&*bench.assets().builtin("smoke", RESOLUTION, 0)?);
+    let density = Grid::of_volume(&*bench.assets().builtin("smoke", RESOLUTION, 0)?)?;
     let medium = Medium { extinction: density.scaled(SIGMA), albedo: ALBEDO, g: G };
     let wide = SIDE / BLOCK;
     let block = |block: usize| {

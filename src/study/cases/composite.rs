@@ -45,7 +45,7 @@ fn trial(bench: &Bench, scale: Scale) -> Result<std::result::Result<Trial, Strin
     };
     let id = bench.assets().volumes().insert(bytes, "head", None)?.1;
     let volume = bench.assets().volumes().get(&id)?;
-    let grid = Grid::of_volume(&volume);
+    let grid = Grid::of_volume(&volume)?;
     let voxel = volume.smallest_side();
     let eye = Eye { eye: DVec3::new(300.0, 190.0, 140.0), wide: 240.0 };
     let truth = reference(&grid, eye, voxel / STEPS_PER_VOXEL);

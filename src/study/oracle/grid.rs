@@ -3,6 +3,7 @@
 use glam::{DVec3, UVec3, dvec3};
 
 use super::inside;
+use crate::error::Result;
 use crate::volume::Volume;
 
 /// Values in equal cells of a box around the origin, x the fastest.
@@ -26,16 +27,19 @@ impl Grid {
     }
 
     /// A grid of a volume's voxels, if the volume's axes are the world's.
-    pub fn of_volume(volume: &Volume) -> Self {
-        let dims = volume.dims();
+    ///
+    /// # Errors
+    /// As [`Volume::voxels`].
+    pub fn of_volume(volume: &Volume) -> Result<Self> {
+        let (dims, values) = (volume.dims(), volume.values()?);
         let to_index = volume.index_from_world();
         let at = |p: DVec3| {
             let index = to_index.transform_point3(p).floor().max(DVec3::ZERO).as_uvec3();
             let last = UVec3::from(dims.map(|n| n as u32 - 1));
             let [x, y, z] = index.min(last).to_array().map(|i| i as usize);
-            volume.value(x, y, z)
+            values.at(x, y, z)
         };
-        Self::of(dims, volume.world_half_size(), at)
+        Ok(Self::of(dims, volume.world_half_size(), at))
     }
 
     /// The grid with all values times `by`.

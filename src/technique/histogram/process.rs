@@ -1,7 +1,6 @@
 //! The histogram on the device. It counts some voxels per slice in whole numbers, so that the table is the same for any number of threads.
 
 use std::fmt::Write;
-use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -21,7 +20,7 @@ const OTHERS: usize = 3;
 /// A histogram at work.
 pub(super) struct Run {
     volume: Arc<Volume>,
-    voxels: Rc<Buffer>,
+    voxels: Arc<Buffer>,
     bins: usize,
     range: [f64; 2],
     pass: HistogramPass,
@@ -35,7 +34,7 @@ impl Run {
     pub fn new(
         device: &Device,
         volume: Arc<Volume>,
-        voxels: Rc<Buffer>,
+        voxels: Arc<Buffer>,
         range: [f64; 2],
         pass: HistogramPass,
     ) -> Result<Self> {

@@ -73,13 +73,14 @@ impl Parameters {
     }
 
     /// The surfaces by ascending raw value.
-    fn surfaces(&self, volume: &Volume) -> Vec<Surface> {
-        let mut surfaces = self.surfaces.clone().unwrap_or_else(|| {
-            let isovalue = self.isovalue.unwrap_or_else(|| surfaces::default_isovalue(volume));
-            vec![Surface::new(isovalue, self.color, self.opacity)]
-        });
+    fn surfaces(&self, volume: &Volume) -> Result<Vec<Surface>> {
+        let isovalue = || self.isovalue.map_or_else(|| surfaces::default_isovalue(volume), Ok);
+        let mut surfaces = match &self.surfaces {
+            Some(surfaces) => surfaces.clone(),
+            None => vec![Surface::new(isovalue()?, self.color, self.opacity)],
+        };
         surfaces.sort_by(|a, b| (a.isovalue * volume.slope()).total_cmp(&(b.isovalue * volume.slope())));
-        surfaces
+        Ok(surfaces)
     }
 
     fn layered(&self, surfaces: &[Surface]) -> bool {
@@ -108,7 +109,7 @@ struct Prepared {
 impl View for Parameters {
     fn prepare(&self, subject: &Subject) -> Result<Arc<dyn PreparedView>> {
         let volume = subject.needed_volume()?.clone();
-        let surfaces = self.surfaces(&volume);
+        let surfaces = self.surfaces(&volume)?;
         let wanted = features(self.interpolation(), self.layered(&surfaces));
         let features = permitted(wanted)?;
         let smallest = volume.smallest_side();

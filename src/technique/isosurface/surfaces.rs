@@ -61,11 +61,14 @@ pub fn check(surfaces: &[Surface], at: &str) -> Result<()> {
 
 /// The isovalue if the request gives none: bone in Hounsfield units, else the threshold that separates two classes of voxels best, by the variance
 /// between them (Otsu, "A Threshold Selection Method from Gray-Level Histograms", IEEE Transactions on Systems, Man and Cybernetics 9(1), 1979).
-pub fn default_isovalue(volume: &Volume) -> f64 {
+///
+/// # Errors
+/// As [`Volume::voxels`].
+pub fn default_isovalue(volume: &Volume) -> Result<f64> {
     if is_hounsfield(volume.range()) {
-        return BONE_HOUNSFIELD;
+        return Ok(BONE_HOUNSFIELD);
     }
-    let histogram = volume.histogram();
+    let histogram = volume.histogram()?;
     let bins = histogram.counts.len();
     let (total, sum) = histogram
         .counts
@@ -82,7 +85,7 @@ pub fn default_isovalue(volume: &Volume) -> f64 {
             (best, at) = (between, i + 1);
         }
     }
-    histogram.min + (histogram.max - histogram.min) * at as f64 / bins.max(1) as f64
+    Ok(histogram.min + (histogram.max - histogram.min) * at as f64 / bins.max(1) as f64)
 }
 
 #[cfg(test)]
@@ -94,7 +97,7 @@ mod tests {
     fn otsus_threshold_is_between_two_classes() {
         let volume = builtin::build("sphere", 16, 0).expect("a sphere");
         let [low, high] = volume.range();
-        let isovalue = default_isovalue(&volume);
+        let isovalue = default_isovalue(&volume).expect("voxels on the host");
         assert!(low < isovalue && isovalue < high, "{low} {isovalue} {high}");
     }
 

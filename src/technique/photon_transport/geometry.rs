@@ -146,9 +146,9 @@ impl Geometry {
 
     fn labels(p: &Parameters, volume: &Volume, media: &[Medium], at: &str) -> Result<Self> {
         let (dims, size_mm) = Self::grid_of(p, volume, at)?;
-        let values =
-            (0..volume.voxels().len()).map(|i| f64::from(volume.voxels().get_f32(i)) * volume.slope() + volume.inter());
-        let of_voxel = values
+        let values = volume.values()?;
+        let of_voxel = (0..volume.voxel_count())
+            .map(|i| values.of(i))
             .map(|v| if v.fract() == 0.0 && (0.0..media.len() as f64).contains(&v) { Ok(v as u16) } else { Err(v) })
             .collect::<std::result::Result<Vec<u16>, f64>>()
             .map_err(|v| {
@@ -164,8 +164,8 @@ impl Geometry {
 
     fn density(p: &Parameters, volume: &Volume, at: &str) -> Result<Self> {
         let (dims, size_mm) = Self::grid_of(p, volume, at)?;
-        let value = |i: usize| (f64::from(volume.voxels().get_f32(i)) * volume.slope() + volume.inter()) as f32;
-        let density: Vec<f32> = (0..volume.voxels().len()).map(value).collect();
+        let values = volume.values()?;
+        let density: Vec<f32> = (0..volume.voxel_count()).map(|i| values.of(i) as f32).collect();
         if let Some(bad) = density.iter().find(|v| !(0.0..=1e9).contains(*v)) {
             return Err(Error::invalid(
                 format!("{at}/density"),

@@ -7,10 +7,9 @@ use super::Simulation;
 use super::device::{FieldPass, STATE_WORDS};
 use super::plan::DevicePlan;
 use super::report::Ledgers;
-use crate::device::{Buffer, Device, DeviceInfo, Resume, SliceLength};
+use crate::device::{Buffer, Device, DeviceInfo, Resume, SliceLength, grid};
 use crate::error::Result;
 use crate::technique::{Look, Process, Progress, Step};
-use crate::volume::Volume;
 
 /// Batches of equal size: enough for the standard errors of the ledger, and a power of two for the doublings.
 const BATCHES: u64 = 32;
@@ -187,17 +186,11 @@ impl Process for Run {
     }
 
     fn look(&mut self, device: &mut Device) -> Result<Look> {
-        let mut grid = vec![0u64; self.plan.cells * self.grids.unwrap_or(1)];
-        device.read(&self.grid, 0, &mut grid)?;
-        let (sums, others) = grid.split_at_mut(self.plan.cells);
-        for own in others.chunks_exact(self.plan.cells) {
-            sums.iter_mut().zip(own).for_each(|(sum, v)| *sum = sum.wrapping_add(*v));
-        }
-        grid.truncate(self.plan.cells);
-        let volume = Volume::new(self.simulation.grid(&grid, self.done))?;
-        let mut result = self.simulation.report(&Ledgers::new(&self.ledgers, self.done), &grid);
+        let (size, scale) = ([self.plan.cells, self.grids.unwrap_or(1)], self.simulation.per_photon(self.done));
+        let (voxels, near_overflow) = grid::of_sums(device, &self.grid, size, scale)?;
+        let mut result = self.simulation.report(&Ledgers::new(&self.ledgers, self.done), near_overflow);
         let ms = 1e3 * self.device_time.as_secs_f64().max(1e-9);
         result["photons_per_ms"] = (self.done as f64 / ms).into();
-        Ok(Look { volume: Arc::new(volume), result })
+        Ok(Look { voxels, result })
     }
 }

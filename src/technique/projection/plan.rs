@@ -90,12 +90,17 @@ impl Parameters {
         self.zero_value.unwrap_or(suits)
     }
 
-    fn sigma_per_value(&self, volume: &Volume) -> f64 {
-        self.sigma_per_value.unwrap_or_else(|| {
-            let mean = (volume.bright_mean() - self.zero_value(volume)).abs();
-            let mean = if mean > 0.0 { mean } else { 1.0 };
-            XRAY_OPTICAL_DEPTH / (mean * scene::mean_side(volume))
-        })
+    /// The extinction per unit and value of an X-ray image; 0 for other projections, which have none.
+    fn sigma_per_value(&self, volume: &Volume) -> Result<f64> {
+        if self.mode != Mode::Xray {
+            return Ok(0.0);
+        }
+        if let Some(given) = self.sigma_per_value {
+            return Ok(given);
+        }
+        let mean = (volume.bright_mean()? - self.zero_value(volume)).abs();
+        let mean = if mean > 0.0 { mean } else { 1.0 };
+        Ok(XRAY_OPTICAL_DEPTH / (mean * scene::mean_side(volume)))
     }
 
     fn window(&self, volume: &Volume) -> Result<Window> {
@@ -105,8 +110,8 @@ impl Parameters {
         let (low, side) = (volume.range()[0], scene::mean_side(volume));
         Ok(match self.mode {
             Mode::Maximum | Mode::Minimum => Window::range(volume),
-            Mode::Mean => Window::of(low, volume.bright_mean()),
-            Mode::Sum => Window::of(low.min(0.0) * side, volume.bright_mean().max(0.0) * side),
+            Mode::Mean => Window::of(low, volume.bright_mean()?),
+            Mode::Sum => Window::of(low.min(0.0) * side, volume.bright_mean()?.max(0.0) * side),
             Mode::Xray => Window::of(0.0, 1.0),
         })
     }
@@ -117,6 +122,7 @@ struct Prepared {
     parameters: Parameters,
     volume: Arc<Volume>,
     window: Window,
+    sigma_per_value: f64,
     plan: ViewPlan,
 }
 
@@ -128,7 +134,7 @@ impl Parameters {
         plain.then(|| 0.5 / f64::from(per_value).abs())
     }
 
-    fn plan(&self, volume: &Volume, window: &Window) -> Result<ViewPlan> {
+    fn plan(&self, volume: &Volume, window: &Window, sigma: f64) -> Result<ViewPlan> {
         let wanted = features(self.interpolation(), self.walked());
         let features = permitted(wanted)?;
         let smallest = volume.smallest_side();
@@ -139,7 +145,7 @@ impl Parameters {
             (_, false) => "every sample is taken: skipping is off".into(),
         });
         if self.mode == Mode::Xray {
-            let (sigma, zero) = (self.sigma_per_value(volume), self.zero_value(volume));
+            let zero = self.zero_value(volume);
             reasons.push(format!("extinction {sigma:.4e} per unit and value above {zero}"));
         }
         Ok(ViewPlan {
@@ -154,7 +160,7 @@ impl Parameters {
     }
 
     /// The device's parameters for a volume.
-    fn on_device(&self, volume: &Volume, window: &Window) -> Projection {
+    fn on_device(&self, volume: &Volume, window: &Window, sigma_per_value: f64) -> Projection {
         let [window_scale, window_offset] = window.scale_and_offset();
         let wanted = if self.mode == Mode::Minimum { -1.0 } else { 1.0 };
         Projection {
@@ -162,7 +168,7 @@ impl Parameters {
             sign: (wanted * volume.slope().signum()) as f32,
             slope: volume.slope() as f32,
             inter: volume.inter() as f32,
-            sigma_per_value: self.sigma_per_value(volume) as f32,
+            sigma_per_value: sigma_per_value as f32,
             zero_value: self.zero_value(volume) as f32,
             window_scale,
             window_offset,
@@ -177,9 +183,10 @@ impl View for Parameters {
         let volume = subject.needed_volume()?;
         let (volume, words) = in_words(volume, self.resolution(&self.window(volume)?));
         let window = self.window(&volume)?;
-        let mut plan = self.plan(&volume, &window)?;
+        let sigma_per_value = self.sigma_per_value(&volume)?;
+        let mut plan = self.plan(&volume, &window, sigma_per_value)?;
         plan.reasons.extend(words);
-        Ok(Arc::new(Prepared { parameters: self.clone(), volume, window, plan }))
+        Ok(Arc::new(Prepared { parameters: self.clone(), volume, window, sigma_per_value, plan }))
     }
 }
 
@@ -203,7 +210,7 @@ impl PreparedView for Prepared {
     }
 
     fn parameters(&self, _camera: &Camera) -> Vec<u8> {
-        bytemuck::bytes_of(&self.parameters.on_device(&self.volume, &self.window)).to_vec()
+        bytemuck::bytes_of(&self.parameters.on_device(&self.volume, &self.window, self.sigma_per_value)).to_vec()
     }
 
     fn table(&self, _step: f32) -> Vec<u32> {

@@ -18,7 +18,6 @@ use crate::scene::interpolation::Interpolation;
 use crate::scene::lights::Lights;
 use crate::technique::majorant::{Tracking, march_bias};
 use crate::technique::optics::Optics;
-use crate::technique::slab::missing;
 use crate::technique::{CellUse, Open, PreparedView, Random, Settings, Subject, View, ViewPlan};
 use crate::volume::Volume;
 
@@ -67,19 +66,6 @@ impl Scatterer {
         volume.non_finite() == 0 && volume.range()[0] == volume.range()[1]
     }
 
-    /// The part of the scattered light that is scattered more often than this view follows it, for a slab as deep as the volume is along its
-    /// shallowest axis.
-    fn missing(&self, volume: &Volume) -> f64 {
-        let followed = if self.kernel == "single_scatter" { Some(1) } else { self.parameters.max_scatterings };
-        let (Some(followed), medium) = (followed, &self.parameters.medium) else { return 0.0 };
-        let density = greatest_along_axes(volume, |v| medium.density_of(v)).into_iter().fold(f64::INFINITY, f64::min);
-        let (sigma, albedo) = (medium.sigma_t_per_unit(volume), medium.albedo.rgb());
-        let of = |c: usize| missing(sigma[c] * density, albedo[c], followed);
-        // Most media are grey; these need one of the three.
-        let grey = (1..3).all(|c| sigma[c] == sigma[0] && albedo[c] == albedo[0]);
-        (0..if grey { 1 } else { 3 }).map(of).fold(0.0, f64::max)
-    }
-
     fn features(&self, volume: &Volume) -> Result<(&'static Features, String)> {
         let (p, interpolation) = (&self.parameters, self.parameters.interpolation());
         let any = matches!(p.tracking, Asked::Auto | Asked::Exact);
@@ -114,15 +100,15 @@ impl Scatterer {
     }
 
     /// The mean density of a few thousand voxels.
-    fn mean_density(&self, volume: &Volume) -> f64 {
-        let n = volume.voxels().len();
+    fn mean_density(&self, volume: &Volume) -> Result<f64> {
+        let (n, values) = (volume.voxel_count(), volume.values()?);
         let stride = (n / MEAN_OF).max(1) | 1;
         let density = |i: usize| {
-            let value = f64::from(volume.voxels().get_f32(i)) * volume.slope() + volume.inter();
+            let value = values.of(i);
             if value.is_finite() { self.parameters.medium.density_of(value) } else { 0.0 }
         };
         let count = n.div_ceil(stride) as f64;
-        (0..n).step_by(stride).map(density).sum::<f64>() / count
+        Ok((0..n).step_by(stride).map(density).sum::<f64>() / count)
     }
 
     /// The cells of the DDA, and the majorant of free paths within them.
@@ -173,7 +159,16 @@ impl View for Scatterer {
             opacity_threshold: 1.0,
             reasons: vec![why, format!("sigma_t_per_unit: {:.6}, {:.6}, {:.6}", sigma[0], sigma[1], sigma[2])],
         };
-        Ok(Arc::new(Prepared { scatterer: self.clone(), volume, features, sigma_t_per_unit: sigma, plan }))
+        let medium = &self.parameters.medium;
+        Ok(Arc::new(Prepared {
+            depths: greatest_along_axes(&volume, |v| medium.density_of(v))?,
+            mean_density: self.mean_density(&volume)?,
+            scatterer: self.clone(),
+            volume,
+            features,
+            sigma_t_per_unit: sigma,
+            plan,
+        }))
     }
 
     fn clips(&self) -> bool {
@@ -192,6 +187,9 @@ struct Prepared {
     volume: Arc<Volume>,
     features: &'static Features,
     sigma_t_per_unit: [f64; 3],
+    /// The greatest integral of the density along each axis, world units.
+    depths: [f64; 3],
+    mean_density: f64,
     plan: ViewPlan,
 }
 
@@ -205,11 +203,11 @@ impl PreparedView for Prepared {
     }
 
     fn settings(&self, open: &Open<'_>) -> Option<Settings> {
-        Some(self.scatterer.settings_of(&self.volume, open))
+        Some(self.scatterer.settings_of(&self.volume, self.depths, open))
     }
 
     fn optics(&self) -> Option<Optics> {
-        Some(self.scatterer.optics_of(&self.volume))
+        Some(self.scatterer.optics_of(&self.volume, self.depths))
     }
 
     fn parameters(&self, _camera: &Camera) -> Vec<u8> {
@@ -245,7 +243,7 @@ impl PreparedView for Prepared {
             roulette_threshold: p.roulette_threshold as f32,
             clamp_luminance: p.clamp_luminance.unwrap_or(0.0) as f32,
             equiangular: i32::from(p.equiangular),
-            sigma_mean: (most * view.mean_density(volume)) as f32,
+            sigma_mean: (most * self.mean_density) as f32,
             ..Scattering::default()
         };
         view.cells(volume, self.features, most, &mut device);
@@ -284,7 +282,7 @@ impl PreparedView for Prepared {
             let message = "the march's free paths are whole steps: where it is densest they are too long by this part";
             warn("march_bias", message, march_bias(h), 0.0);
         }
-        let missing = self.scatterer.missing(volume);
+        let missing = self.scatterer.missing(volume, self.depths);
         if missing > SCATTERINGS_MISSING {
             let message = "this part of what a slab of the same depth would send back is scattered more often than is followed here";
             warn("multiple_scattering_missing", message, missing, SCATTERINGS_MISSING);

@@ -6,8 +6,8 @@ use serde_json::json;
 
 use super::plan::Scatterer;
 use crate::scene::bounds::Bounds;
-use crate::scene::depth::greatest_along_axes;
 use crate::technique::optics::Optics;
+use crate::technique::slab::missing;
 use crate::technique::{Open, Setting, Settings};
 use crate::volume::Volume;
 
@@ -24,14 +24,27 @@ const ONCE: &str = "single_scatter";
 pub(in crate::technique) const NOT_OF_ONCE: [&str; 3] = ["max_scatterings", "next_event", "roulette_threshold"];
 
 impl Scatterer {
-    /// The optics of the scene.
-    pub(super) fn optics_of(&self, volume: &Volume) -> Optics {
+    /// The part of the scattered light that is scattered more often than this view follows it, for a slab as deep as the volume is along its
+    /// shallowest axis.
+    pub(super) fn missing(&self, volume: &Volume, depths: [f64; 3]) -> f64 {
+        let followed = if self.kernel == "single_scatter" { Some(1) } else { self.parameters.max_scatterings };
+        let (Some(followed), medium) = (followed, &self.parameters.medium) else { return 0.0 };
+        let density = depths.into_iter().fold(f64::INFINITY, f64::min);
+        let (sigma, albedo) = (medium.sigma_t_per_unit(volume), medium.albedo.rgb());
+        let of = |c: usize| missing(sigma[c] * density, albedo[c], followed);
+        // Most media are grey; these need one of the three.
+        let grey = (1..3).all(|c| sigma[c] == sigma[0] && albedo[c] == albedo[0]);
+        (0..if grey { 1 } else { 3 }).map(of).fold(0.0, f64::max)
+    }
+
+    /// The optics of the scene, with the greatest integral of the density along each axis.
+    pub(super) fn optics_of(&self, volume: &Volume, depths: [f64; 3]) -> Optics {
         let medium = &self.parameters.medium;
         let sigma = medium.sigma_t_per_unit(volume).into_iter().fold(0.0, f64::max);
         let given = self.parameters.lights.as_ref().map(|_| self.lights.shares(Bounds::from(volume).radius()));
         let shares = given.unwrap_or_default().into_iter().enumerate();
         Optics {
-            optical_depth: greatest_along_axes(volume, |v| medium.density_of(v)).map(|d| sigma * d),
+            optical_depth: depths.map(|d| sigma * d),
             albedo: medium.albedo.rgb().into_iter().fold(0.0, f64::max),
             anisotropy: medium.phase.mean_cosine(),
             light_shares: shares.filter_map(|(i, share)| Some((i, share?))).collect(),
@@ -39,14 +52,14 @@ impl Scatterer {
     }
 
     /// Settings with fewer scatterings, if the technique is open, and settings without the faintest lights.
-    pub(super) fn settings_of(&self, volume: &Volume, open: &Open<'_>) -> Settings {
+    pub(super) fn settings_of(&self, volume: &Volume, depths: [f64; 3], open: &Open<'_>) -> Settings {
         let name = self.kernel;
         let words = if name == ONCE { format!("{name}, as asked") } else { format!("{name}, every scattering") };
         let mut found = Settings { all: vec![Setting::as_given(name, words)], ruled_out: Vec::new() };
         if !open.auto {
             return found;
         }
-        let optics = self.optics_of(volume);
+        let optics = self.optics_of(volume, depths);
         if open.leaves("max_scatterings") && optics.albedo != 0.0 {
             self.add_fewer_scatterings(&optics, open, &mut found);
         }

@@ -18,7 +18,10 @@ fn closes(scene: &Value) -> Value {
     let result = job.resource()["result"].clone();
     assert!((sum(&result) - 1.0).abs() < 1e-6, "{scene}: the ledger adds up to {}", sum(&result));
     let field = job.field().unwrap();
-    assert!((0..field.voxels().len()).all(|i| field.voxels().get_f32(i).is_finite()), "{scene}: a voxel is not finite");
+    assert!(
+        (0..field.voxel_count()).all(|i| field.voxels().unwrap().get_f32(i).is_finite()),
+        "{scene}: a voxel is not finite"
+    );
     result
 }
 

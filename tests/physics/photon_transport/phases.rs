@@ -121,7 +121,7 @@ fn the_gather_sees_the_density_that_is_sampled() {
             let medium = json!({"mu_a_per_mm": 2, "mu_s_per_mm": 0, "index": 1, "phase": phase});
             let scene = json!({"photons": 200_000, "size_mm": [1, 1, 1], "grid": [1, 1, 1], "medium": medium, "tally": "radiance_gather", "eye_mm": eye});
             let job = crate::common::engine::House::shared().finish(&super::run::request(&scene));
-            let got = job.field().unwrap().value(0, 0, 0);
+            let got = job.field().unwrap().values().unwrap().at(0, 0, 0);
             // The truth is (1 / sigma) times the sum of w P / dV, and 1 - exp(-2) of the light collides.
             let truth = (1.0 - (-2f64).exp()) / 2.0 * density(cosine);
             assert!((got / truth - 1.0).abs() < 0.006, "{phase} at {cosine}: {got} for {truth}");

@@ -199,7 +199,7 @@ fn first_collisions_follow_the_exponential_law() {
             let (from, to) = (1.5 * f64::from(i) / 8.0, 1.5 * f64::from(i + 1) / 8.0);
             let expected = photons * ((-from).exp() - (-to).exp());
             // The weights of weighted tracking spread more than counts do, so the spread of the seeds gives the error.
-            let counts = runs.iter().map(|r| r.value(0, 0, i as usize) * photons * 60.0 * 60.0 * 0.125);
+            let counts = runs.iter().map(|r| r.values().unwrap().at(0, 0, i as usize) * photons * 60.0 * 60.0 * 0.125);
             let (mean, error) = spread(&counts.collect::<Vec<_>>());
             (mean - expected) / error
         });
@@ -220,7 +220,7 @@ fn both_estimators_give_the_same_fluence_at_every_depth() {
                     let more =
                         json!({"tally": tally, "estimator": estimator, "seed": first + seed, "photons": 100_000});
                     let field = House::shared().finish(&request(&with(&scene, &more))).field().unwrap();
-                    (0..30).map(|i| field.value(0, 0, i)).collect()
+                    (0..30).map(|i| field.values().unwrap().at(0, 0, i)).collect()
                 })
                 .collect()
         };

@@ -115,7 +115,7 @@ fn a_point_light_in_a_vacuum_falls_with_the_square_of_the_distance() {
             let r2 = at(0, i % m).powi(2) + at(1, i / m % m).powi(2) + at(2, i / m / m).powi(2);
             truth += 1.0 / (4.0 * std::f64::consts::PI * r2) / (m * m * m) as f64;
         }
-        let got = field.value(voxel[0], voxel[1], voxel[2]);
+        let got = field.values().unwrap().at(voxel[0], voxel[1], voxel[2]);
         // The number of photons that cross the voxel is two million times its solid angle. A track has a spread of about a half.
         let crossing = 2e6 * truth / 400.0;
         let z = (got / truth - 1.0) / (1.2 / crossing.sqrt());
@@ -131,7 +131,7 @@ fn both_estimators_of_the_fluence_agree() {
             "technique": "emission_absorption", "volume": {"photon_transport": parameters}, "image": {"width": 8, "height": 8}, "budget": {"samples": 1}
         });
         let field = House::shared().finish(&request).field().unwrap();
-        (0..field.voxels().len()).map(|i| f64::from(field.voxels().get_f32(i))).sum::<f64>()
+        (0..field.voxel_count()).map(|i| f64::from(field.voxels().unwrap().get_f32(i))).sum::<f64>()
     };
     let ((track, track_error), (collision, collision_error)) =
         (over_seeds(20, |s| mean("track_length", s)), over_seeds(20, |s| mean("collision", 1000 + s)));

@@ -59,7 +59,7 @@ fn by_photons(volume: &Value, albedo: f64, g: f64) -> f64 {
     let job = House::shared().finish(&request);
     let field = job.field().unwrap();
     // The gather is per photon. An irradiance of 1 on the face of 2 × 2 mm is four of them.
-    let gather = |[x, y, z]: [usize; 3]| 4.0 * field.value(x, y, z);
+    let gather = |[x, y, z]: [usize; 3]| 4.0 * field.values().unwrap().at(x, y, z);
     let side = FINE * SIDE;
     let rays = (0..side * side).map(|i| seen(&gather, SIGMA_T * albedo, i % side, i / side));
     rays.sum::<f64>() / (side * side) as f64

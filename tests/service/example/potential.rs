@@ -16,13 +16,12 @@ use cloudchamber::asset::Assets;
 use cloudchamber::device::program::{Source, Variant};
 use cloudchamber::device::reduce::{self, Reduction};
 use cloudchamber::device::structs::DeviceStruct;
-use cloudchamber::device::{Buffer, Device, SliceLength};
+use cloudchamber::device::{Buffer, Device, SliceLength, grid};
 use cloudchamber::device_struct;
 use cloudchamber::error::Result;
 use cloudchamber::request;
 use cloudchamber::scene::bounds::Bounds;
 use cloudchamber::technique::{Cases, Field, Kind, Look, Process, Progress, Step, Technique, Work};
-use cloudchamber::volume::{NewVolume, Volume, Voxels};
 use glam::DVec3;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -36,7 +35,11 @@ pub const TECHNIQUE: Technique = Technique {
     example,
     source,
     shares: &[],
-    cases: || Cases { all: vec![json!({"iterations": 3, "grid": [4, 5, 6]}).into()], tiny: vec![example()] },
+    cases: || Cases {
+        all: vec![json!({"iterations": 3, "grid": [4, 5, 6]}).into()],
+        tiny: vec![example()],
+        ..Cases::default()
+    },
     kind: Kind::Field { parse, work: Work { of: "iterations", most: |_| 100_000, first: 10, looks: 0 } },
 };
 
@@ -213,21 +216,7 @@ impl Process for Run {
     }
 
     fn look(&mut self, device: &mut Device) -> Result<Look> {
-        let mut values = vec![0.0; self.voxels];
-        device.read(&self.now, 0, &mut values)?;
-        let volume = Volume::new(NewVolume {
-            dims: self.parameters.grid,
-            spacing: [1.0; 3],
-            linear: None,
-            voxels: Voxels::F32(values),
-            slope: 1.0,
-            inter: 0.0,
-            name: TECHNIQUE.name.into(),
-            format: "field".into(),
-            file_affine: None,
-            unit: "unit".into(),
-            notes: Vec::new(),
-        })?;
-        Ok(Look { volume: Arc::new(volume), result: json!({"iterations": self.done, "rms_change": self.rms_change}) })
+        let voxels = grid::copy(device, &self.now, self.voxels)?;
+        Ok(Look { voxels, result: json!({"iterations": self.done, "rms_change": self.rms_change}) })
     }
 }
