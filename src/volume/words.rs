@@ -47,7 +47,9 @@ impl Volume {
         let inter = self.inter() + self.slope() * low;
         let parts = NewVolume { slope, inter, notes: self.notes().to_vec(), ..self.parts_with(voxels) };
         let words = self.derived(parts, self.world_from_index);
-        Some(Arc::new(Self { bright_mean: self.bright_mean.clone(), away, ..words }))
+        // The quantile of the words is the word of the quantile.
+        let upper = self.upper.map(|upper| f64::from(scale.word(upper as f32)) * slope + inter);
+        Some(Arc::new(Self { bright_mean: self.bright_mean.clone(), upper, away, ..words }))
     }
 }
 
@@ -61,14 +63,18 @@ pub struct WordScale {
 }
 
 impl WordScale {
+    /// The word of a value. The cast saturates, so that a value that rounding takes past an end becomes the end.
+    fn word(self, value: f32) -> u16 {
+        ((value - self.first) * self.per_value + 0.5) as u16
+    }
+
     /// The words of floats; none for voxels that are no floats.
     pub(super) fn words(self, voxels: &Voxels) -> Voxels {
         let Voxels::F32(values) = voxels else { return Voxels::U16(Vec::new()) };
         let mut words = vec![0u16; values.len()];
         over_slices(&mut words, PART, |part, words| {
             for (word, value) in words.iter_mut().zip(&values[part * PART..]) {
-                // The cast saturates, so that a value that rounding takes past an end becomes the end.
-                *word = ((value - self.first) * self.per_value + 0.5) as u16;
+                *word = self.word(*value);
             }
         });
         Voxels::U16(words)

@@ -179,6 +179,12 @@ fn words_made_on_the_device_are_those_of_the_host() {
     assert_eq!(&Voxels::U16(words), of_host.voxels().unwrap());
     assert!(!of_device.is_on_host());
     assert_eq!(of_device.voxels().unwrap(), of_host.voxels().unwrap(), "on the host they are the same too");
+    let Voxels::U16(of_words) = of_host.voxels().unwrap() else { panic!("they are words") };
+    let mut sorted = of_words.clone();
+    sorted.sort_unstable();
+    let rank = ((sorted.len() - 1) as f64 * GridStatistics::UPPER) as usize;
+    let upper = f64::from(sorted[rank]) * of_host.slope() + of_host.inter();
+    assert_eq!(of_device.upper(), Some(upper), "the quantile of the words");
     let told =
         |v: &Volume| (v.voxel_type(), v.slope(), v.inter(), v.range(), v.histogram().unwrap().clone(), v.bytes());
     assert_eq!(told(&of_device), told(&of_host));
