@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use crate::config::{DeviceArgs, Limits};
 use crate::error::{Error, Result};
 use crate::study;
-use crate::study::results::{PLANNER, Results, STABILITY};
+use crate::study::results::{HONESTY, PLANNER, Results, STABILITY};
 
 /// What `study` is told.
 #[derive(clap::Args)]
@@ -16,7 +16,7 @@ pub(super) struct Arguments {
     /// Fewer settings and seeds: seconds a case
     #[arg(long)]
     quick: bool,
-    /// Which of the planner's random scenes, as 20..40 (default: 110 of them, or 10; the last ten are of voxels finer than the pixels)
+    /// Which of the random scenes of `planner` or `honesty`, as 20..40 (default: 110 and 420 of them, or 10 and 40 if quick)
     #[arg(long, value_parser = study::planner::scenes)]
     scenes: Option<std::ops::Range<u64>>,
     /// Where the results go, a JSON a case (default: studies in the data folder)
@@ -38,11 +38,11 @@ pub(super) fn study(args: &Arguments) -> Result<()> {
     let experiment = |e: &study::experiments::Experiment| all_experiments || asked(e.name);
     let cases: Vec<&study::Case> = study::CASES.iter().filter(|c| asked(c.name)).collect();
     let experiments = study::experiments::EXPERIMENTS;
-    if cases.is_empty() && !experiments.iter().any(experiment) && !asked(PLANNER) {
+    if cases.is_empty() && !experiments.iter().any(experiment) && !asked(PLANNER) && !asked(HONESTY) {
         let names: Vec<&str> = study::CASES
             .iter()
             .map(|c| c.name)
-            .chain([STABILITY, PLANNER])
+            .chain([STABILITY, PLANNER, HONESTY])
             .chain(experiments.iter().map(|e| e.name))
             .collect();
         return Err(Error::internal(format!("there is no such case; there are: {}", names.join(", "))));
@@ -75,6 +75,12 @@ pub(super) fn study(args: &Arguments) -> Result<()> {
             let all = results.put_planned(study::planner::planner(&bench, scene..scene + 1, &mut told)?)?;
             let ([met, timed, cheap], n) = (all.figures(), all.scenes.len());
             told(&format!("of {n} plans {met} meet the error, {timed} the time, {cheap} the cost"));
+        }
+    }
+    if asked(HONESTY) {
+        for scene in args.scenes.clone().unwrap_or(0..scale.pick(40, 420)) {
+            let quick = scale == study::Scale::Quick;
+            results.put_honesty(study::honesty::honesty(&bench, scene..scene + 1, quick, &mut told)?)?;
         }
     }
     println!("written to {}", results.folder().display());

@@ -21,20 +21,20 @@ fn fit(range: &Mime, offer: &str) -> Option<u8> {
 /// # Errors
 /// [`Error::NotAcceptable`] when it accepts none.
 pub fn negotiate(headers: &HeaderMap, offers: &[&'static str]) -> Result<&'static str> {
-    let wishes: Vec<Mime> = headers
+    let ranges: Vec<Mime> = headers
         .get_all(header::ACCEPT)
         .iter()
         .filter_map(|v| v.to_str().ok())
         .flat_map(|v| v.split(','))
         .filter_map(|range| range.trim().parse().ok())
         .collect();
-    if wishes.is_empty() {
+    if ranges.is_empty() {
         return offers.first().copied().ok_or_else(|| Error::internal("nothing to negotiate"));
     }
     let quality = |range: &Mime| range.get_param("q").and_then(|q| q.as_str().parse::<f32>().ok()).unwrap_or(1.0);
     // The most specific range that fits an offer gives its quality.
     let liked = |offer: &str| {
-        wishes
+        ranges
             .iter()
             .filter_map(|r| fit(r, offer).map(|f| (f, quality(r))))
             .max_by_key(|(f, _)| *f)

@@ -32,13 +32,13 @@ pub enum TransferFunction {
 
 /// The range of a preset's values. A field's brightest voxels are next to its source and would leave the rest dark, so its default range
 /// excludes them.
-fn span(wish: Option<[f64; 2]>, volume: &Volume, at: &str) -> Result<[f64; 2]> {
-    match wish {
+fn span(given: Option<[f64; 2]>, volume: &Volume, at: &str) -> Result<[f64; 2]> {
+    match given {
         Some([low, high]) if high > low => Ok([low, high]),
         Some([low, _]) => {
             Err(Error::invalid(format!("{at}/value_range/1"), "the range is empty", format!("more than {low}")))
         }
-        // A millionth of the largest value, so that the range is not empty.
+        // At least a millionth of the largest value, so that the range is not empty.
         None => Ok(volume.upper().map_or(volume.range(), |upper| {
             let least = (volume.range()[1] * 1e-6).max(f64::MIN_POSITIVE);
             [0.0, upper.max(least)]

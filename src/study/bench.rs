@@ -133,6 +133,11 @@ impl Bench {
         self.handle.block_on(self.service.planner().settings(request))
     }
 
+    /// True if a request is valid.
+    pub fn is_valid(&self, request: &Value) -> bool {
+        self.service.scene(request).is_ok()
+    }
+
     /// True if the view of a request takes random samples.
     ///
     /// # Errors

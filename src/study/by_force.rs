@@ -51,9 +51,9 @@ pub(super) fn truth(bench: &Bench, reference: &Value, asked: f64) -> Result<Know
         request["image"][side] = json!(2 * reference["image"][side].as_u64().unwrap_or(0));
     }
     if let Some(technique) = request["technique"].as_str().and_then(technique::find) {
-        for (field, value) in (technique.cases)().truth {
-            request[technique.name][field] = value;
-        }
+        let mut own = request[technique.name].as_object().cloned().unwrap_or_default();
+        ((technique.cases)().truth)(&mut own);
+        request[technique.name] = own.into();
     }
     let mut samples = 8;
     loop {

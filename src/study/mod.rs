@@ -14,6 +14,7 @@ pub mod experiments;
 pub mod fit;
 #[cfg(feature = "flip")]
 pub mod flip;
+pub mod honesty;
 pub mod measure;
 pub mod oracle;
 mod page;

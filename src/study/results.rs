@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use include_dir::{Dir, include_dir};
 use serde::de::DeserializeOwned;
 
+use super::honesty::Honesty;
 use super::planner::Planned;
 use super::record::Record;
 use super::stability::Stability;
@@ -20,6 +21,9 @@ pub const STABILITY: &str = "stability";
 
 /// The name of the planner's study.
 pub const PLANNER: &str = "planner";
+
+/// The name of the study of stated errors.
+pub const HONESTY: &str = "honesty";
 
 /// The prefix of the names of records that compare with another program; `./dev bench equal_error` makes them.
 pub const PEERS: &str = "vtk_";
@@ -115,6 +119,23 @@ impl Results {
         }
         self.write("planner.json", &json(&found)?)?;
         self.write("planner.md", &found.page())?;
+        Ok(found)
+    }
+
+    /// Puts the outcomes of the study of stated errors and their page in the folder, beside those of other scenes from the same program on the same
+    /// machine. Returns all of them.
+    ///
+    /// # Errors
+    /// As [`Results::put`].
+    pub fn put_honesty(&self, mut found: Honesty) -> Result<Honesty> {
+        if let Some(old) = self.record::<Honesty>(HONESTY).filter(|old| old.machine.is_same(&found.machine)) {
+            let again = |o: &super::honesty::Outcome| found.scenes.iter().any(|new| new.scene == o.scene);
+            let kept: Vec<_> = old.scenes.into_iter().filter(|o| !again(o)).collect();
+            found.scenes.extend(kept);
+            found.scenes.sort_by_key(|o| o.scene);
+        }
+        self.write("honesty.json", &json(&found)?)?;
+        self.write("honesty.md", &found.page())?;
         Ok(found)
     }
 

@@ -2,6 +2,8 @@
 
 use serde_json::{Map, Value, json};
 
+use super::draw::Draw;
+
 /// A technique's own parameters for a test. A view's run on volumes of every voxel type. Instead of an id they name a volume of the tests: `{"test":
 /// "labels"}`.
 #[derive(Debug, Clone)]
@@ -19,14 +21,23 @@ impl From<Value> for Case {
 }
 
 /// All cases of a technique.
-#[derive(Debug, Clone, Default)]
+#[derive(Clone)]
 pub struct Cases {
     /// The cases. Together they run every variant of its kernels, and no other.
     pub all: Vec<Case>,
     /// Requests of a few pixels and photons that reach all parts of its kernels. An interpreter of OpenCL checks their accesses to memory.
     pub tiny: Vec<Value>,
-    /// Parameters with which the study renders a truth, in place of a request's: the same picture, known sooner.
-    pub truth: Map<String, Value>,
+    /// Parameters of its own at random, for the study of stated errors.
+    pub draw: fn(&mut Draw<'_>) -> Value,
+    /// Changes parameters so that they give the truth of the same picture, by another path if there is one: a shorter step, no early end, another
+    /// tracker.
+    pub truth: fn(&mut Map<String, Value>),
+}
+
+impl Default for Cases {
+    fn default() -> Self {
+        Self { all: Vec::new(), tiny: Vec::new(), draw: |_| json!({}), truth: |_| () }
+    }
 }
 
 /// The parameters with each interpolation in turn.

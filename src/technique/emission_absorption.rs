@@ -32,6 +32,7 @@
 
 mod cases;
 mod cuda_sample;
+mod draw;
 pub mod pieces;
 pub mod plan;
 pub mod regions;

@@ -7,6 +7,7 @@
 //! it is played. With the handle both stand in one function, in the order in which they happen.
 
 mod case;
+mod draw;
 pub mod emission_absorption;
 mod export;
 mod field;
@@ -38,6 +39,7 @@ use crate::device::program::Source;
 use crate::error::{Error, Result};
 use crate::scene::interpolation::Interpolation;
 pub use case::{Case, Cases};
+pub use draw::Draw;
 pub use export::{Export, File, OnDevice};
 pub use field::{Field, Look};
 pub use process::{Process, Progress, Step};

@@ -72,9 +72,7 @@ fn cases() -> Cases {
     let own = json!({"adaptive": true, "medium": medium, "lights": lights});
     let glass = json!({"medium": {"sigma_t_per_unit": 2, "index": 1.5}, "lights": [{"type": "sky"}]});
     let tiny = vec![tiny(TECHNIQUE.name, "sphere", 10, 2, &own), tiny(TECHNIQUE.name, "constant", 8, 2, &glass)];
-    // Weights have less noise than collisions by chance.
-    let truth = [("tracking".to_owned(), json!("weighted"))].into_iter().collect();
-    Cases { truth, ..scattering::cases(tiny) }
+    scattering::cases(tiny)
 }
 
 fn source() -> Source {

@@ -35,18 +35,18 @@ impl GridStatistics {
 
 /// The voxels of a volume on the device.
 pub(super) struct Away {
-    values: Arc<Values>,
+    values: Arc<GridValues>,
     /// The words as which the volume takes the values, if it does.
     words: Option<(WordScale, OnceLock<Voxels>)>,
 }
 
 /// The values of a grid, on the device, on the host, or both.
-struct Values {
+struct GridValues {
     grid: Mutex<Option<Arc<dyn DeviceGrid>>>,
     here: OnceLock<Voxels>,
 }
 
-impl Values {
+impl GridValues {
     fn grid(&self) -> Option<Arc<dyn DeviceGrid>> {
         self.grid.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
@@ -63,7 +63,7 @@ impl Values {
 
 impl Away {
     fn new(grid: Arc<dyn DeviceGrid>) -> Self {
-        Self { values: Arc::new(Values { grid: Mutex::new(Some(grid)), here: OnceLock::new() }), words: None }
+        Self { values: Arc::new(GridValues { grid: Mutex::new(Some(grid)), here: OnceLock::new() }), words: None }
     }
 
     /// The same values as words.

@@ -1,5 +1,6 @@
 //! The study on the real device, in its quick form: cases reach their truth as theory says, and no method is wrong in silence.
 
+mod honesty;
 mod planner;
 
 use std::sync::{Mutex, PoisonError};

@@ -3,6 +3,7 @@
 use serde_json::json;
 
 use super::TECHNIQUE;
+use super::draw::{draw, truth};
 use crate::technique::case::{Cases, interpolated, tiny};
 
 pub(super) fn cases() -> Cases {
@@ -13,5 +14,5 @@ pub(super) fn cases() -> Cases {
         all.push(json!({"shading": shading, "pre_integrated": true}).into());
     }
     let tiny = vec![tiny(TECHNIQUE.name, "sphere", 12, 2, &json!({"shading": true}))];
-    Cases { all, tiny, ..Cases::default() }
+    Cases { all, tiny, draw, truth }
 }
