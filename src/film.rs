@@ -123,15 +123,14 @@ pub struct Film {
     pub sums: Sums,
     /// The control, if there is one yet.
     pub control: Option<Samples>,
-    /// True if a sample of the control is that of the same number of the others but for its step. Then nothing is random in their
-    /// difference.
-    pub paired: bool,
     /// True if the step plays no part in the picture, so that it causes no error.
     pub stepless: bool,
     /// True if its samples are random. With one sample, the error is estimated from the differences of neighbours.
     pub noisy: bool,
     /// The opacity at which rays end.
     pub opacity_threshold: f64,
+    /// True if the control's rays go to their end, so that its difference has the loss of others' early end.
+    pub to_the_end: bool,
     /// The relative change of the picture since the field had half its histories.
     pub field_error: Option<f64>,
     /// The background behind the volume.
@@ -142,6 +141,8 @@ pub struct Film {
     pub step_loss: Option<f64>,
     /// The difference of half of the samples to all of them, once it is known.
     pub(crate) halves: Option<Halves>,
+    /// The noise of the difference to the control, once it is known.
+    pub(crate) step_noise: Option<Halves>,
     /// The rounds of a pilot.
     pub(crate) rounds: Vec<Arc<Round>>,
 }

@@ -15,15 +15,18 @@ pub struct ErrorEstimate {
     /// The standard error of the mean over the samples. If the halves of the samples agree better than those of random ones would, it is
     /// the difference of the halves instead. They do so if the places in a pixel are spread evenly over an edge.
     pub noise: Option<f64>,
-    /// The difference that halving the step made, less its noise.
+    /// The difference that halving the step made, less its noise; with that of following rays to their end, if they end early.
     pub discretisation: Option<f64>,
     /// The loss of a picture of fewer pixels than asked for.
     pub resolution: Option<f64>,
-    /// The contribution from behind the opacity at which rays end.
+    /// The contribution from behind the opacity at which rays end. It is null if a control has measured it together with the step's.
     pub truncation: Option<f64>,
     /// The contribution of a field that is still being computed: the change since it had half its histories.
     pub field: Option<f64>,
 }
+
+/// The deviations of its noise by which the difference to the control may be wrong.
+const STEP_DEVIATIONS: f64 = 2.0;
 
 impl Film {
     /// The error, estimated from the samples alone.
@@ -38,7 +41,6 @@ impl Film {
             0 | 1 => self.noisy.then(|| block * (4.0f64 / 3.0).sqrt()),
             _ => Some(self.known_noise(SURE).0),
         };
-        let truncation = (sums.truncated / pixels).sqrt();
         let (discretisation, joint) = match (&self.control, &sums.control, self.main.stride) {
             (Some(control), Some(apart), 1) => self.against(control.count, apart),
             _ if self.stepless => (Some(0.0), None),
@@ -48,7 +50,10 @@ impl Film {
             _ => (None, None),
         };
         let resolution = (self.main.stride > 1).then_some(block);
-        let parts = [noise, discretisation.or(joint), resolution, Some(truncation)];
+        // A control whose rays go to their end has measured what is behind the ends of the others.
+        let is_measured = self.to_the_end && discretisation.or(joint).is_some();
+        let truncation = (!is_measured).then(|| (sums.truncated / pixels).sqrt());
+        let parts = [noise, discretisation.or(joint), resolution, truncation];
         let own = parts.iter().flatten().map(|e| e * e).sum::<f64>().sqrt();
         let total = relative(own).hypot(self.field_error.unwrap_or(0.0));
         ErrorEstimate {
@@ -56,9 +61,14 @@ impl Film {
             noise: noise.map(relative),
             discretisation: discretisation.map(relative),
             resolution: resolution.map(relative),
-            truncation: Some(relative(truncation)),
+            truncation: truncation.map(relative),
             field: self.field_error,
         }
+    }
+
+    /// The most that is likely to lie behind the opacity at which rays end, relative.
+    pub fn truncation(&self) -> f64 {
+        self.relative((self.sums.truncated / self.main.pixels().max(1) as f64).sqrt())
     }
 
     /// The standard error of the mean over random samples, of luminance, root mean square over the pixels; and the effective number of its
@@ -76,24 +86,27 @@ impl Film {
     }
 
     /// The difference to the control, whose step is twice as long. A method of first order or better is at most this wrong: |I(h) − I| ≤
-    /// |I(2h) − I(h)|. With two samples or more the noise of both is taken off and the rest is discretisation. With one sample the two
-    /// cannot be told apart, and the second value is both together. Paired samples have their noise in common. Without a change of step,
-    /// the m samples of the control and the n proper ones differ only by the n − m that one of them lacks, with a variance of 1/m − 1/n of
-    /// a sample's.
+    /// |I(2h) − I(h)|. A sample of the control is the proper one of the same number but for its step, so most of their noise is in common. The noise
+    /// of the difference is known from its halves, and it is taken off, less what it may be wrong by. Before the halves are known, it is a part of
+    /// the difference. With one sample it cannot be told from the picture's own noise, and the second value is both together. The m samples of the
+    /// control and the n proper ones also differ by the n − m that one of them lacks, with a variance of 1/m − 1/n of a sample's.
     fn against(&self, control_samples: u32, apart: &Apart) -> (Option<f64>, Option<f64>) {
         let (n, m) = (f64::from(self.main.count), f64::from(control_samples));
         let pixels = apart.pixels.max(1) as f64;
         if self.main.count < 2 {
             return (None, Some((apart.squared / pixels).sqrt()));
         }
-        let noise = apart.variance * if self.paired { (1.0 / m - 1.0 / n).abs() } else { 1.0 / n + 1.0 / m };
-        (Some(((apart.squared - noise) / pixels).max(0.0).sqrt()), None)
+        let lacking = apart.variance * (1.0 / m - 1.0 / n).abs() / pixels;
+        let noise = lacking + self.step_noise.map_or(0.0, |halves| halves.squared_after(self.main.count));
+        // The noise is known to a relative variance of 2/ν of its square.
+        let doubt = STEP_DEVIATIONS * noise * (2.0 / pixels).sqrt();
+        (Some(((apart.squared / pixels - noise).max(0.0) + doubt).sqrt()), None)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Samples, Sums};
+    use super::super::{Halves, Samples, Sums};
     use super::*;
 
     /// A film of 2 × 2 pixels of one luminance, with `count` samples of one variance each, and a control of another luminance.
@@ -132,10 +145,14 @@ mod tests {
     }
 
     #[test]
-    fn paired_samples_have_their_noise_in_common() {
-        // With as many samples of both, the difference is due to the step alone, whatever the noise.
-        let film = |paired: bool| Film { paired, ..film(0.5, 4, 0.09, Some((0.6, 4))) };
-        assert!((film(true).error().discretisation.unwrap_or(0.0) - 0.2).abs() < 1e-12);
-        assert_eq!(film(false).error().discretisation, Some(0.0));
+    fn the_noise_of_the_difference_to_the_control_is_taken_off_less_its_doubt() {
+        // With as many samples of both, the noise of the samples plays no part.
+        let film = |step_noise| Film { step_noise, ..film(0.5, 4, 0.09, Some((0.6, 4))) };
+        let of = |step_noise| film(step_noise).error().discretisation.unwrap_or(0.0);
+        assert!((of(None) - 0.2).abs() < 1e-12, "before the halves are known all of it is the step's");
+        // Halves of 8 samples that are 0.05 apart: of 4 samples the square is twice that.
+        let (squared, doubt) = (0.01 - 0.005, 2.0 * 0.005 * 0.5f64.sqrt());
+        let halves = Some(Halves { samples: 8, apart: 0.05 });
+        assert!((of(halves) - 2.0 * (squared + doubt).sqrt()).abs() < 1e-12, "{}", of(halves));
     }
 }

@@ -55,6 +55,11 @@ impl Halves {
         Self { samples: all.samples, apart: half.apart(all) }
     }
 
+    /// The square of the difference after `samples`, as that of random halves.
+    pub fn squared_after(&self, samples: u32) -> f64 {
+        self.apart * self.apart * f64::from(self.samples) / f64::from(samples)
+    }
+
     /// The noise after `samples`, if it is clearly less than `random`, the noise of random samples. More samples are taken to be random.
     /// For random halves the square is `random`² on average, with a relative variance of 2/ν. The number of `pixels` that matter, ν = (Σ
     /// sᵢ²)² / Σ sᵢ⁴, may be small if only a few pixels met a firefly.

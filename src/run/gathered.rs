@@ -18,7 +18,7 @@ use crate::job::SampleCounts;
 use crate::render::Scene;
 use crate::technique::{Random, ViewPlan};
 
-/// The stride of the control if the picture's shorter side has at least 400 pixels, at least 200, or fewer. A thousand pixels and more tell the
+/// The stride of the control if the picture's shorter side has at least 400 pixels, at least 100, or fewer. A thousand pixels and more tell the
 /// error.
 const CONTROL: [usize; 3] = [8, 4, 2];
 
@@ -45,9 +45,10 @@ pub(super) struct Gathered {
     /// The relative change of the picture since the field had half its histories.
     pub field_error: Option<f64>,
     random: Option<Random>,
-    paired: bool,
     stepless: bool,
     opacity_threshold: f64,
+    /// True if the control's rays go to their end, where others end early.
+    to_the_end: bool,
     background: Background,
     encoder: Encoder,
     /// The last encoded film, as long as it is the one to show.
@@ -58,13 +59,13 @@ pub(super) struct Gathered {
 
 impl Gathered {
     /// Room for the samples that `plan` takes of a scene, with the tables of twice its step and of its step. The memory of `before` is used again
-    /// if it has the same size. `paired` is true if a sample of the control differs from the main sample of the same number by its step alone.
+    /// if it has the same size. `to_the_end` is true if the control's rays go to their end, where others end early.
     pub fn new(
         context: &mut DeviceContext,
         scene: &Scene,
         [of_control, of_main]: [Rc<Buffer>; 2],
         plan: &ViewPlan,
-        paired: bool,
+        to_the_end: bool,
         before: Option<Self>,
     ) -> Result<Self> {
         let region = scene.region();
@@ -74,23 +75,22 @@ impl Gathered {
         let device = &context.device;
         let sparse = match size[0].min(size[1]) {
             400.. => CONTROL[0],
-            200.. => CONTROL[1],
+            100.. => CONTROL[1],
             _ => CONTROL[2],
         };
         let mut room: VecDeque<Buffer> = room.unwrap_or_default();
-        let mut layer =
-            |table, stride, stream, step| Layer::new(device, scene, table, stride, stream, step, room.pop_front());
+        let mut layer = |table, stride, step| Layer::new(device, scene, table, stride, 0, step, room.pop_front());
         Ok(Self {
             size,
-            layers: [layer(of_control, sparse, 1, 2.0 * plan.step)?, layer(of_main, 1, 0, plan.step)?],
+            layers: [layer(of_control, sparse, 2.0 * plan.step)?, layer(of_main, 1, plan.step)?],
             moving: None,
             rounds: Rounds::new(scene.is_pilot()),
             counts: device.upload(&[0; 32], 0)?,
             field_error: None,
             random: scene.view().random(),
-            paired,
             stepless: plan.stepless,
             opacity_threshold: plan.opacity_threshold,
+            to_the_end,
             background: scene.background(),
             encoder,
             encoded: None,
@@ -139,10 +139,9 @@ impl Gathered {
         let owed = match main.samples {
             // Without a step the control is only the first picture: there is no error of a step to control.
             _ if self.stepless => 1,
-            // A paired control gets as many samples as the main layer. Otherwise noise would pass for the step's error, or hide it.
-            n if self.paired => n + 1,
-            0 | 1 => 1,
-            n => 1 + n.ilog2(),
+            // A sample of the control is the main sample of the same number but for its step. Otherwise noise would pass for the step's error, or
+            // hide it.
+            n => n + 1,
         };
         if control.samples < owed { Pass::Control } else { Pass::Main }
     }
@@ -205,15 +204,16 @@ impl Gathered {
             main,
             sums,
             control,
-            paired: self.paired,
             stepless: self.stepless,
             noisy: self.random.is_some(),
             opacity_threshold: self.opacity_threshold,
+            to_the_end: self.to_the_end,
             field_error: self.field_error,
             background: self.background,
             lowered,
             step_loss,
             halves: self.rounds.halves(),
+            step_noise: self.rounds.step_noise(),
             rounds: self.rounds.on_the_way(),
         })
     }
@@ -234,7 +234,9 @@ impl Gathered {
 
     /// Keeps the picture after a main pass, if its halves are to be compared.
     pub fn keep_round(&mut self, context: &DeviceContext, device_time: Duration) -> Result<()> {
-        self.rounds.passed(context, &self.layers[1], device_time)
+        let [control, main] = &self.layers;
+        let control = (!self.stepless).then_some(control);
+        self.rounds.passed(context, main, control, device_time)
     }
 
     fn read_counts(&self, context: &DeviceContext) -> Result<SampleCounts> {

@@ -24,7 +24,7 @@ pub(super) struct Layer {
     pub table: Rc<Buffer>,
     /// Its step, world units.
     pub step: f32,
-    /// The number of its random stream, which no other layer of the view has.
+    /// The number of its random stream. The control has the main layer's, so that both have the same random numbers.
     pub stream: u32,
     /// The tiles that its passes sample, if the view renders tiles.
     tiling: Option<(Tiling, Buffer)>,

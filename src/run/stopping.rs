@@ -30,13 +30,16 @@ pub(super) fn next(view: &mut ViewRun, started: Instant, context: &DeviceContext
     }
     let enough = samples >= if view.is_random() { Random::LEAST_SAMPLES } else { 2 };
     let Some(most) = budget.max_error.filter(|_| enough && is_round(samples)) else { return Ok(Next::GoOn) };
-    let error = view.gathered.encode(context)?.error();
+    let film = view.gathered.encode(context)?;
+    let error = film.error();
     let noise = error.noise.unwrap_or(0.0);
     let bias = (error.total.powi(2) - noise.powi(2)).max(0.0).sqrt();
     if error.total <= most {
         Ok(Next::Stop("error"))
     } else if bias > 0.7 * most && samples >= 4 && noise < bias {
-        let by_step = error.discretisation.unwrap_or(0.0) > 0.5 * bias && view.can_halve_step();
+        // A shorter step does not bring back what is behind the ends of rays.
+        let of_step = error.discretisation.unwrap_or(0.0);
+        let by_step = of_step > 0.5 * bias && of_step > 2.0 * film.truncation() && view.can_halve_step();
         Ok(if by_step {
             Next::Refine
         } else if noise < 0.1 * bias {

@@ -46,6 +46,8 @@ pub(super) struct ViewRun {
     /// The distances of the macro-cells, if the kernel does not read their ranges.
     distances: Option<Rc<Buffer>>,
     parameters: Buffer,
+    /// The control's own parameters, if its rays alone go to their end.
+    to_the_end: Option<Buffer>,
     view_buffer: Buffer,
     /// The camera and image, alone and with the pass under way.
     view: DeviceView,
@@ -94,9 +96,11 @@ impl ViewRun {
         let view = device_view(&scene, &*prepared, &bounds);
         let table = |step| table(&context.device, volume.as_deref(), &scene, &*prepared, step);
         let tables = [table(2.0 * plan.step)?, table(plan.step)?];
-        let gathered = Gathered::new(context, &scene, tables, &plan, is_paired(&view), before)?;
+        let to_the_end = prepared.parameters_to_the_end(scene.camera());
+        let gathered = Gathered::new(context, &scene, tables, &plan, to_the_end.is_some(), before)?;
         let device = &context.device;
         let parameters = device.upload(&prepared.parameters(scene.camera()), 0)?;
+        let to_the_end = to_the_end.map(|own| device.upload(&own, 0)).transpose()?;
         let view_buffer = device.allocate(size_of::<DeviceView>())?;
         let packets = if scene.view().random().is_some() { 1 } else { packets_of_beam(device.info().lanes as usize) };
         let resume = Resume::new(device, plan.state_words * packets)?;
@@ -119,6 +123,7 @@ impl ViewRun {
             volume,
             distances,
             parameters,
+            to_the_end,
             view_buffer,
             view,
             pass_view: view,
@@ -137,6 +142,9 @@ impl ViewRun {
         self.scene = scene.clone();
         self.view = device_view(scene, &*self.prepared, &self.bounds);
         context.device.write(&mut self.parameters, 0, &self.prepared.parameters(scene.camera()))?;
+        if let (Some(buffer), Some(own)) = (&mut self.to_the_end, self.prepared.parameters_to_the_end(scene.camera())) {
+            context.device.write(buffer, 0, &own)?;
+        }
         let speed = context.speed(&self.plan.variant);
         self.slice_length = SliceLength::new(context.device.info(), self.longest / f64::from(self.plan.step), speed);
         self.quick = quick(speed, self.gathered.size);
@@ -245,11 +253,6 @@ fn table(
         Some(volume) => volume.table(device, scene.own(), prepared, step),
         None => upload_table(device, prepared, step),
     }
-}
-
-/// True if a sample of the control differs from the main sample of the same number by its step alone.
-fn is_paired(view: &DeviceView) -> bool {
-    view.jittered == 0
 }
 
 fn quick(speed: Option<f64>, [width, height]: [usize; 2]) -> bool {

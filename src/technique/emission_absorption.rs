@@ -37,6 +37,7 @@ pub mod pieces;
 pub mod plan;
 pub mod regions;
 pub mod style;
+mod variants;
 
 use std::sync::Arc;
 
@@ -62,7 +63,7 @@ pub const TECHNIQUE: Technique = Technique {
     summary: "Alpha-blended ray casting through a transfer function, front to back with early termination",
     schema: request::schema_of::<Parameters>,
     example,
-    source: plan::source,
+    source: variants::source,
     shares: &[],
     cases: cases::cases,
     kind: Kind::View { parse, complete: "emission_absorption", calibration: Some(super::smoke) },

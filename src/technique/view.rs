@@ -96,6 +96,10 @@ pub trait PreparedView: Send + Sync {
     fn volume(&self) -> Option<&Arc<Volume>>;
     /// The kernel's own parameters for a camera, as the bytes of its device struct.
     fn parameters(&self, camera: &Camera) -> Vec<u8>;
+    /// The same parameters for rays that go to their end, if others may end so early that this is seen. The control's rays tell the loss.
+    fn parameters_to_the_end(&self, _camera: &Camera) -> Option<Vec<u8>> {
+        None
+    }
     /// The kernel's read-only table for a step, such as a transfer function's opacities.
     fn table(&self, _step: f32) -> Vec<u32> {
         Vec::new()

@@ -40,9 +40,10 @@ impl ViewRun {
             self.resume.before(device, items)?;
         }
         let layer = self.gathered.layer(pass);
+        let own = self.to_the_end.as_ref().filter(|_| pass == Pass::Control).unwrap_or(&self.parameters);
         let mut arguments = vec![
             ("view", &self.view_buffer),
-            ("params", &self.parameters),
+            ("params", own),
             ("table", &*layer.table),
             ("film", &layer.buffer),
             ("counts", &self.gathered.counts),

@@ -4,13 +4,12 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 
-use super::pieces::{PIECES, pieces};
+use super::pieces::pieces;
 use super::regions::Region;
+use super::variants::{Features, STATE_WORDS, features, permitted, plain, styled};
 use super::{EmissionAbsorption, Parameters, TECHNIQUE, regions};
-use crate::device::Resume;
-use crate::device::numbers::define;
-use crate::device::program::{Source, Variant, each_voxel_type, listed};
-use crate::device::structs::{DeviceStruct, View as DeviceView};
+use crate::device::program::Variant;
+use crate::device::structs::View as DeviceView;
 use crate::error::Result;
 use crate::scene::camera::Camera;
 use crate::scene::interpolation::Interpolation;
@@ -19,74 +18,11 @@ use crate::scene::transfer::{TABLE_SIZE, TransferFunction, pack};
 use crate::technique::stepping::{Way, stepping};
 use crate::technique::steps::coarse_step;
 use crate::technique::view::in_words;
-use crate::technique::{CellUse, Open, PreparedView, Settings, Subject, View, ViewPlan, view_words};
+use crate::technique::{CellUse, Open, PreparedView, Settings, Subject, View, ViewPlan};
 use crate::volume::{Volume, VoxelType};
 
-/// Words of a lane that a launch leaves to the next: a packet's radiance and transmittance.
-const STATE_WORDS: usize = 4;
-
-type Features = [(&'static str, i32); 5];
-
-const fn features(interpolation: Interpolation, shaded: bool, reversed: bool, styled: bool, pre: bool) -> Features {
-    [
-        ("INTERPOLATION", interpolation.code()),
-        ("SHADED", shaded as i32),
-        ("BACK_TO_FRONT", reversed as i32),
-        ("STYLED", styled as i32),
-        ("PREINTEGRATED", pre as i32),
-    ]
-}
-
-const fn plain(interpolation: Interpolation, shaded: bool) -> Features {
-    features(interpolation, shaded, false, false, false)
-}
-
-const fn styled(interpolation: Interpolation) -> Features {
-    features(interpolation, false, false, true, false)
-}
-
-/// Every set of features that may be built; the first two are built before the service is ready.
-static FEATURES: [Features; 16] = {
-    use Interpolation::{BSpline, CatmullRom, Nearest, Trilinear};
-    [
-        plain(Trilinear, false),
-        plain(Trilinear, true),
-        features(Trilinear, false, true, false, false),
-        features(Trilinear, true, true, false, false),
-        features(Trilinear, false, false, false, true),
-        features(Trilinear, true, false, false, true),
-        plain(Nearest, false),
-        plain(Nearest, true),
-        plain(BSpline, false),
-        plain(BSpline, true),
-        plain(CatmullRom, false),
-        plain(CatmullRom, true),
-        styled(Trilinear),
-        styled(Nearest),
-        styled(BSpline),
-        styled(CatmullRom),
-    ]
-};
-const COMMON: usize = 2;
-
-/// The listed features that are `wanted`. `check_together` refuses every combination that is not listed.
-fn permitted(wanted: Features) -> Result<&'static Features> {
-    listed(TECHNIQUE.name, &FEATURES, wanted)
-}
-
-pub(super) fn source() -> Source {
-    Source {
-        kernel: TECHNIQUE.name,
-        words: || {
-            view_words()
-                + &[define("TABLE_SIZE", TABLE_SIZE), define("PIECES", PIECES)].concat()
-                + &Resume::opencl_text_of_beams("RADIANCE", STATE_WORDS)
-        },
-        structs: || vec![DeviceView::LAYOUT, EmissionAbsorption::LAYOUT],
-        variants: || each_voxel_type(TECHNIQUE.name, &FEATURES),
-        common: COMMON * VoxelType::ALL.len(),
-    }
-}
+/// The opacity from which on what a ray leaves out is not seen.
+const EARLY: f64 = 0.99;
 
 impl Parameters {
     fn transfer_function(&self, volume: &Volume) -> Result<(TransferFunction, String)> {
@@ -200,6 +136,33 @@ impl View for Parameters {
     }
 }
 
+impl Prepared {
+    /// The device's parameters; a ray ends at the opacity `threshold`.
+    fn on_device(&self, threshold: f64) -> Vec<u8> {
+        let (own, volume) = (&self.parameters, &self.volume);
+        let mut device = EmissionAbsorption {
+            transmittance_floor: if threshold >= 1.0 { 0.0 } else { (1.0 - threshold) as f32 },
+            brightness: (own.brightness * own.cuda_sample.as_ref().map_or(1.0, |c| c.brightness)) as f32,
+            lit: i32::from(own.shading),
+            ..EmissionAbsorption::default()
+        };
+        let ([low, high], entries) = match &self.colours {
+            Colours::Regions(regions) => {
+                let (values, steep) = regions::extent(regions, volume);
+                device.gradient_scale = (volume.slope().abs() * 255.0 / steep) as f32;
+                (values, 256)
+            }
+            Colours::Function(function) => (function.domain(), TABLE_SIZE),
+        };
+        let per_value = (entries - 1) as f64 / (high - low);
+        device.table_scale = (volume.slope() * per_value) as f32;
+        // The half entry rounds a value to the nearest one.
+        device.table_offset = ((volume.inter() - low) * per_value + 0.5) as f32;
+        own.styles().apply(volume, &mut device);
+        bytemuck::bytes_of(&device).to_vec()
+    }
+}
+
 impl PreparedView for Prepared {
     fn plan(&self) -> &ViewPlan {
         &self.plan
@@ -237,28 +200,11 @@ impl PreparedView for Prepared {
     }
 
     fn parameters(&self, _camera: &Camera) -> Vec<u8> {
-        let (own, volume) = (&self.parameters, &self.volume);
-        let threshold = own.threshold();
-        let mut device = EmissionAbsorption {
-            transmittance_floor: if threshold >= 1.0 { 0.0 } else { (1.0 - threshold) as f32 },
-            brightness: (own.brightness * own.cuda_sample.as_ref().map_or(1.0, |c| c.brightness)) as f32,
-            lit: i32::from(own.shading),
-            ..EmissionAbsorption::default()
-        };
-        let ([low, high], entries) = match &self.colours {
-            Colours::Regions(regions) => {
-                let (values, steep) = regions::extent(regions, volume);
-                device.gradient_scale = (volume.slope().abs() * 255.0 / steep) as f32;
-                (values, 256)
-            }
-            Colours::Function(function) => (function.domain(), TABLE_SIZE),
-        };
-        let per_value = (entries - 1) as f64 / (high - low);
-        device.table_scale = (volume.slope() * per_value) as f32;
-        // The half entry rounds a value to the nearest one.
-        device.table_offset = ((volume.inter() - low) * per_value + 0.5) as f32;
-        own.styles().apply(volume, &mut device);
-        bytemuck::bytes_of(&device).to_vec()
+        self.on_device(self.parameters.threshold())
+    }
+
+    fn parameters_to_the_end(&self, _camera: &Camera) -> Option<Vec<u8>> {
+        (self.parameters.threshold() < EARLY).then(|| self.on_device(1.0))
     }
 
     fn table(&self, step: f32) -> Vec<u32> {
