@@ -77,7 +77,8 @@ impl RawType {
     }
 }
 
-/// Reads exactly `count` voxels, which must be all that is left, and returns a note if values were rounded.
+/// Reads exactly `count` voxels, which must be all that is left, and returns notes if 32-bit floats cannot hold some of their values: if they were
+/// rounded, are too large and became NaN, or are so small that they became 0.
 ///
 /// Memory grows with the data that arrive, not with the number in the header. `pointer` names the header's field that announced `count`.
 pub(super) fn decode(
@@ -86,10 +87,11 @@ pub(super) fn decode(
     endian: Endian,
     count: usize,
     pointer: &str,
-) -> Result<(Voxels, Option<String>)> {
+) -> Result<(Voxels, Vec<String>)> {
     check_length(source, raw, count, pointer)?;
     let little = endian == Endian::Little;
-    let rounded = Cell::new(0u64);
+    let [rounded, too_large, too_small] = [(); 3].map(|()| Cell::new(0u64));
+    let count_one = |cell: &Cell<u64>| cell.set(cell.get() + 1);
     let mut reader = Reader { source, count, pointer };
     macro_rules! read {
         ($type:ty, $convert:expr) => {{
@@ -122,13 +124,23 @@ pub(super) fn decode(
         RawType::U64 => Voxels::F32(read_integer_as_f32!(u64)),
         RawType::F64 => Voxels::F32(read!(f64, |value: f64| {
             let kept = value as f32;
-            rounded.set(rounded.get() + u64::from(f64::from(kept) != value && value.is_finite()));
+            match kept {
+                _ if !value.is_finite() || f64::from(kept) == value => {}
+                _ if kept.is_infinite() => count_one(&too_large),
+                _ if kept == 0.0 => count_one(&too_small),
+                _ => count_one(&rounded),
+            }
             kept
         })),
     };
-    let rounded = rounded.get();
-    let note = (rounded > 0).then(|| format!("{rounded} of {count} values were rounded to 32-bit floats"));
-    Ok((voxels, note))
+    let told = [
+        (rounded, "were rounded to 32-bit floats"),
+        (too_large, "are beyond the range of 32-bit floats (±3.4e38) and were lost: nothing is there"),
+        (too_small, "are below the range of 32-bit floats (1.4e-45) and became 0"),
+    ];
+    let notes =
+        told.iter().filter(|(n, _)| n.get() > 0).map(|(n, what)| format!("{} of {count} values {what}", n.get()));
+    Ok((voxels, notes.collect()))
 }
 
 /// Refuses an impossible number of voxels before any memory is taken. The body's length bounds the number.

@@ -261,6 +261,20 @@ fn nrrd_skips_and_an_axis_of_one() {
 }
 
 #[test]
+fn doubles_that_floats_cannot_hold_are_named_by_what_becomes_of_them() {
+    let values = [1e39f64, -2e300, 1e-50, 0.1, 0.5, f64::NAN, f64::INFINITY, -0.0];
+    let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+    let text = |query: &str| Some(query.to_owned());
+    let query = RawQuery { dims: text("8,1,1"), r#type: text("f64"), spacing: None, endian: None };
+    let volume = read(&bytes, "test", query.parse().unwrap(), &LIMITS).unwrap();
+    let notes = volume.notes().join("; ");
+    for said in ["2 of 8 values are beyond", "1 of 8 values are below", "1 of 8 values were rounded"] {
+        assert!(notes.contains(said), "{said}: {notes}");
+    }
+    assert_eq!((volume.non_finite(), volume.range()), (4, [0.0, 0.5]));
+}
+
+#[test]
 fn nrrd_lines_may_end_as_on_windows() {
     let mut file = b"NRRD0005\r\ntype: uint8\r\ndimension: 3\r\nsizes: 2 1 1\r\nencoding: raw\r\n\r\n".to_vec();
     file.extend([7, 9]);
