@@ -13,7 +13,7 @@ use serde_json::Value;
 use super::bench::{Bench, Reads};
 use super::machine;
 use super::record::Machine;
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// The sides of pictures, pixels; a quick study has the first few.
 const SIZES: [u32; 9] = [16, 24, 32, 48, 64, 96, 128, 256, 512];
@@ -90,7 +90,17 @@ pub fn honesty(bench: &Bench, scenes: Range<u64>, quick: bool, told: &mut dyn Fn
     let mut outcomes = Vec::new();
     for number in scenes {
         let Some(scene) = scene::scene(bench, number, sizes)? else { continue };
-        let found = outcome(bench, number, &scene)?;
+        let found = outcome(bench, number, &scene);
+        forget_volume(bench, &scene.request)?;
+        let found = match found {
+            // The planner may refuse what each view takes by itself. No error is stated then.
+            Err(Error::Invalid(why)) => {
+                let why: Vec<String> = why.iter().map(|w| format!("{}: {}", w.pointer, w.detail)).collect();
+                told(&format!("honesty, scene {number}, {}: refused, {}", scene.technique, why.join("; ")));
+                continue;
+            }
+            found => found?,
+        };
         told(&format!(
             "honesty, scene {number}, {}: states {:.4?}, is {:.4?} (known to {:.1e}), {} samples, {}",
             found.technique,
@@ -101,7 +111,6 @@ pub fn honesty(bench: &Bench, scenes: Range<u64>, quick: bool, told: &mut dyn Fn
             found.stopped_by.as_deref().unwrap_or_default(),
         ));
         outcomes.push(found);
-        forget_volume(bench, &scene.request)?;
     }
     Ok(Honesty { machine: machine(bench), scenes: outcomes })
 }
