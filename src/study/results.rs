@@ -112,10 +112,7 @@ impl Results {
     /// As [`Results::put`].
     pub fn put_planned(&self, mut found: Planned) -> Result<Planned> {
         if let Some(old) = self.record::<Planned>(PLANNER).filter(|old| old.machine.is_same(&found.machine)) {
-            let again = |o: &super::planner::Outcome| found.scenes.iter().any(|new| new.scene == o.scene);
-            let kept: Vec<_> = old.scenes.into_iter().filter(|o| !again(o)).collect();
-            found.scenes.extend(kept);
-            found.scenes.sort_by_key(|o| o.scene);
+            join(&mut found.scenes, old.scenes, |outcome| outcome.scene);
         }
         self.write("planner.json", &json(&found)?)?;
         self.write("planner.md", &found.page())?;
@@ -129,10 +126,7 @@ impl Results {
     /// As [`Results::put`].
     pub fn put_honesty(&self, mut found: Honesty) -> Result<Honesty> {
         if let Some(old) = self.record::<Honesty>(HONESTY).filter(|old| old.machine.is_same(&found.machine)) {
-            let again = |o: &super::honesty::Outcome| found.scenes.iter().any(|new| new.scene == o.scene);
-            let kept: Vec<_> = old.scenes.into_iter().filter(|o| !again(o)).collect();
-            found.scenes.extend(kept);
-            found.scenes.sort_by_key(|o| o.scene);
+            join(&mut found.scenes, old.scenes, |outcome| outcome.scene);
         }
         self.write("honesty.json", &json(&found)?)?;
         self.write("honesty.md", &found.page())?;
@@ -145,6 +139,13 @@ impl Results {
         std::fs::create_dir_all(&self.folder).map_err(failed)?;
         std::fs::write(&path, text).map_err(failed)
     }
+}
+
+/// Adds the old outcomes of scenes that were not run again, in the order of the scenes.
+fn join<O>(found: &mut Vec<O>, old: Vec<O>, scene: impl Fn(&O) -> u64) {
+    let kept: Vec<O> = old.into_iter().filter(|o| !found.iter().any(|new| scene(new) == scene(o))).collect();
+    found.extend(kept);
+    found.sort_by_key(scene);
 }
 
 fn json<R: serde::Serialize>(record: &R) -> Result<String> {
