@@ -1,8 +1,8 @@
 // Encodes the film on the device: as the picture in sRGB bytes, and as the sums for its error. The film stays on the device.
 //
-// Items, in order: blocks of two rows of the film; rows of the control; if the film has fewer pixels than the picture (WHOLE 0), rows of the picture,
-// which is interpolated. Each of the first two leaves SUM_LENGTH numbers of its own, which the host sums in double precision. Squares are summed
-// relative to the greatest square so far, so that none falls below the least float.
+// Items, in order: blocks of two rows of the film; if the film has fewer pixels than the picture (WHOLE 0), rows of the picture, which is
+// interpolated. A block leaves SUM_LENGTH numbers of its own, which the host sums in double precision. Squares are summed relative to the greatest
+// square so far, so that none falls below the least float.
 
 #include "shared/lanes.h"
 #include "shared/pixels.h"
@@ -71,11 +71,6 @@ static inline float of_between(Real row, float scale, int x, int inside, float *
     }
 #endif
     return sum;
-}
-
-// The variance of single samples of some pixels; 0 if it is not known.
-static inline Real variances(Real m2, Real count) {
-    return select((Real)(0.0f), m2 / (count - 1.0f), MASK(count > 1.0f) & known(m2));
 }
 
 static inline void of_film(constant Encode *d, global const float *film, global const uint *counts, global const uchar *curve,
@@ -151,38 +146,6 @@ static inline void of_film(constant Encode *d, global const float *film, global 
     sums[SUM_WEIGHTED] = sum_lanes(weighted);
 }
 
-// Compares a row of the control with the film's pixels at the same positions.
-static inline void of_control(constant Encode *d, global const float *film, global const float *control, global const uint *counts,
-                              int y, global float *sums) {
-    global const float *deviations = film + 4 * d->width * d->height;
-    float scale = 0.0f;
-    Real difference = (Real)(0.0f), variance = difference;
-    int row = y * d->control_stride;
-    for (int x = 0; x < d->control_width; x += LANES) {
-        Mask lanes = MASK(LANE_IDS < d->control_width - x);
-        Real alpha;
-        Real l = luminances(load_pixels(control, y * d->control_width + x, &alpha));
-        Int column = select((Int)(0), (x + LANE_IDS) * d->control_stride, lanes);
-        Int at = row * d->width + column;
-        Real3 colour = real3(gather_reals(film, 4 * at), gather_reals(film, 4 * at + 1), gather_reals(film, 4 * at + 2));
-        Real distance = select((Real)(0.0f), fabs(luminances(colour) - l), lanes);
-        float ratio = rescale(&scale, distance);
-        if (ratio != 1.0f) difference *= ratio;
-        Real part = distance * inverse(scale);
-        difference += part * part;
-        if (!d->deviations) continue;
-        Real samples = (Real)((float)d->count);
-        if (d->tile > 0) {
-            Int tile = row / d->tile * d->tiles_wide + column / d->tile;
-            samples = to_real(gather_ints((global const int *)counts, tile));
-        }
-        variance += select((Real)(0.0f), variances(gather_reals(deviations, at), samples), lanes);
-    }
-    sums[CONTROL_DIFFERENCE_SCALE] = scale;
-    sums[CONTROL_DIFFERENCE] = sum_lanes(difference);
-    sums[CONTROL_VARIANCE] = sum_lanes(variance);
-}
-
 #if !WHOLE
 // The position of a picture's pixel among the film's `n`: between the returned pixel and *high, at *part of the distance.
 static inline Int film_position(Int full, int stride, int n, Int *high, Real *part) {
@@ -224,22 +187,16 @@ static inline int enlarge(constant Encode *d, global const float *film, global c
 }
 #endif
 
-kernel void encode(constant Encode *settings, global const float *film, global const float *control, global const uint *counts,
-                    global const uchar *curve, global uchar *picture, global float *sums) {
+kernel void encode(constant Encode *settings, global const float *film, global const uint *counts, global const uchar *curve,
+                    global uchar *picture, global float *sums) {
     int item = (int)get_global_id(0);
     int blocks = (settings->width + ACROSS - 1) / ACROSS * ((settings->height + 1) / 2);
     if (item < blocks) {
         of_film(settings, film, counts, curve, picture, item, sums + SUM_LENGTH * item);
         return;
     }
-    global float *own = sums + SUM_LENGTH * item;
-    item -= blocks;
-    if (item < settings->control_height) {
-        of_control(settings, film, control, counts, item, own);
-        return;
-    }
 #if !WHOLE
-    item -= settings->control_height;
-    if (item < settings->picture_height) own[0] = (float)enlarge(settings, film, curve, picture, item);
+    int row = item - blocks;
+    if (row < settings->picture_height) sums[SUM_LENGTH * item] = (float)enlarge(settings, film, curve, picture, row);
 #endif
 }

@@ -11,6 +11,7 @@
 #include "shared/light.h"
 #include "shared/path_film.h"
 #include "shared/phase.h"
+#include "shared/places.h"
 #include "shared/resume.h"
 #include "shared/rng.h"
 #include "shared/tile.h"
@@ -33,7 +34,7 @@ typedef struct {
 
 static inline void begin(constant const View *view, constant const Scattering *params, Int column, Int row, Mask fresh, Sample *s) {
     Flight *f = &s->flight;
-    CameraFlight camera = begin_camera_flight(view, params, sample_offset(f->sample), column, row, fresh, f);
+    CameraFlight camera = begin_camera_flight(view, params, sample_offset(view, f->sample), column, row, fresh, f);
     s->at = select(s->at, row * view->width + column, fresh);
     s->task = select(s->task, (Int)(0), fresh);
     s->light = select3(s->light, real3((Real)(0.0f), (Real)(0.0f), (Real)(0.0f)), fresh);

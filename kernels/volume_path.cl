@@ -9,6 +9,7 @@
 #include "shared/light.h"
 #include "shared/path_film.h"
 #include "shared/phase.h"
+#include "shared/places.h"
 #include "shared/resume.h"
 #include "shared/rng.h"
 #include "shared/surface.h"
@@ -32,7 +33,7 @@ typedef struct {
 static inline void begin(constant const View *view, constant const Scattering *params, Int column, Int row, Mask fresh, Path *path,
                          Mask *done) {
     Flight *f = &path->flight;
-    CameraFlight camera = begin_camera_flight(view, params, sample_offset(f->sample), column, row, fresh, f);
+    CameraFlight camera = begin_camera_flight(view, params, sample_offset(view, f->sample), column, row, fresh, f);
     path->at = select(path->at, row * view->width + column, fresh);
     path->light = select3(path->light, real3((Real)(0.0f), (Real)(0.0f), (Real)(0.0f)), fresh);
     path->alpha = select(path->alpha, (Real)(1.0f), fresh);

@@ -20,7 +20,7 @@ pub fn convergence(trace: &[TracePoint], state: &str) -> Result<String> {
 
 fn draw(svg: &mut String, trace: &[TracePoint], state: &str) -> std::result::Result<(), Box<dyn std::error::Error>> {
     let points: Vec<(f64, f64, bool)> =
-        trace.iter().map(|p| (p.elapsed_ms.max(0.1), p.error.max(LEAST_ERROR), p.stride == 1)).collect();
+        trace.iter().filter_map(|p| Some((p.elapsed_ms.max(0.1), p.error?.max(LEAST_ERROR), p.stride == 1))).collect();
     let x = bounds(points.iter().map(|p| p.0), [1.0, 1000.0], 1.5);
     let y = bounds(points.iter().map(|p| p.1), [1e-3, 1.0], 1.5);
     let area = SVGBackend::with_string(svg, (640, 400)).into_drawing_area();

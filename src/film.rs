@@ -4,6 +4,7 @@ pub mod difference;
 mod estimate;
 mod lowered;
 pub mod picture;
+mod probed;
 mod rounds;
 pub mod srgb;
 mod sums;
@@ -13,8 +14,9 @@ use std::sync::Arc;
 pub use estimate::ErrorEstimate;
 pub use lowered::Lowered;
 use picture::Background;
-pub(crate) use rounds::{Halves, Round, SURE, is_round, pilot_rounds};
-pub use sums::{Apart, Sums};
+pub use probed::{Estimate, ProbePixel, ProbedNoise, ProbedStep, StepPixel};
+pub(crate) use rounds::{Round, is_round, pilot_rounds};
+pub use sums::Sums;
 
 /// Means and squared deviations of one set of samples, as the device leaves them (`kernels/shared/film.h`).
 #[derive(Debug, Clone, Default)]
@@ -55,7 +57,7 @@ impl Tiles {
 }
 
 /// The luminance of linear sRGB (ITU-R BT.709), `luminance` of the kernel.
-fn luminance(p: &[f32]) -> f64 {
+pub(crate) fn luminance(p: &[f32]) -> f64 {
     0.2126 * f64::from(p[0]) + 0.7152 * f64::from(p[1]) + 0.0722 * f64::from(p[2])
 }
 
@@ -112,7 +114,7 @@ impl Samples {
     }
 }
 
-/// The samples that a view has gathered, and those of a control at twice the step on every second pixel.
+/// The samples that a view has gathered, and what is known of their error.
 #[derive(Debug, Clone, Default)]
 pub struct Film {
     /// The size of the picture asked for.
@@ -121,15 +123,19 @@ pub struct Film {
     pub main: Samples,
     /// The sums from which its error is computed.
     pub sums: Sums,
-    /// The control, if there is one yet.
-    pub control: Option<Samples>,
+    /// The noise by a probe, once it is known.
+    pub probed_noise: Option<ProbedNoise>,
+    /// What the step costs by a probe, once it is known.
+    pub probed_step: Option<ProbedStep>,
     /// True if the step plays no part in the picture, so that it causes no error.
     pub stepless: bool,
     /// True if its samples are random. With one sample, the error is estimated from the differences of neighbours.
     pub noisy: bool,
+    /// True if the method has an error besides noise that is not measured.
+    pub biased: bool,
     /// The opacity at which rays end.
     pub opacity_threshold: f64,
-    /// True if the control's rays go to their end, so that its difference has the loss of others' early end.
+    /// True if the probe's rays go to their end at longer steps, so that its difference has the loss of others' early end.
     pub to_the_end: bool,
     /// The relative change of the picture since the field had half its histories.
     pub field_error: Option<f64>,
@@ -137,14 +143,19 @@ pub struct Film {
     pub background: Background,
     /// The quality that was reduced so that the picture came in time.
     pub lowered: Lowered,
-    /// The loss of the longer step, relative, if it is known.
-    pub step_loss: Option<f64>,
-    /// The difference of half of the samples to all of them, once it is known.
-    pub(crate) halves: Option<Halves>,
-    /// The noise of the difference to the control, once it is known.
-    pub(crate) step_noise: Option<Halves>,
+    /// The losses of a picture that was reduced to be in time, relative, as earlier pictures showed them.
+    pub reduced: Option<Reduced>,
     /// The rounds of a pilot.
     pub(crate) rounds: Vec<Arc<Round>>,
+}
+
+/// The losses of a picture that was reduced to be in time, relative.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Reduced {
+    /// The loss of its longer step.
+    pub step: f64,
+    /// The noise of one sample per pixel, if it is known.
+    pub noise: Option<f64>,
 }
 
 impl Film {
@@ -170,15 +181,13 @@ impl Film {
         self.relative(self.sums.of_every_second())
     }
 
-    /// The loss of twice the step at the control's pixels, relative, with the noise of both.
+    /// The loss of twice the step, relative, if a probe has measured it.
     pub fn step_loss_seen(&self) -> Option<f64> {
-        let apart = self.sums.control?;
-        Some(self.relative((apart.squared / apart.pixels.max(1) as f64).sqrt()))
+        self.probed_step.map(|step| self.relative(step.twice))
     }
 
     /// The bytes of the film on the device.
     pub fn bytes(&self) -> usize {
-        let held = |s: &Samples| 20 * s.pixels();
-        held(&self.main) + self.control.as_ref().map_or(0, held)
+        20 * self.main.pixels()
     }
 }

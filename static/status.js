@@ -67,7 +67,7 @@ export class Status {
       this.#first = false;
     }
     set('samples', frame.samples === null ? '–' : String(frame.samples));
-    set('error', frame.error === null ? 'unknown' : this.#error(frame.error, frame.samples));
+    set('error', frame.error === null ? 'not known yet' : this.#error(frame.error, frame.samples));
     set('elapsed', milliseconds(frame.elapsedMs));
     set('lowered', frame.lowered ? `Lowered for now: ${frame.lowered}` : '');
     byId('lowered').hidden = !frame.lowered;
@@ -78,7 +78,7 @@ export class Status {
     this.state(resource.state);
     const { timings = {} } = resource;
     if (Number.isFinite(resource.samples)) set('samples', String(resource.samples));
-    if (Number.isFinite(resource.error)) set('error', this.#error(resource.error, resource.samples));
+    set('error', Number.isFinite(resource.error) ? this.#error(resource.error, resource.samples) : 'not known');
     if (Number.isFinite(timings.elapsed_ms)) set('elapsed', milliseconds(timings.elapsed_ms));
     if (Number.isFinite(timings.first_frame_ms)) set('first-frame', milliseconds(timings.first_frame_ms));
     set('stopped', STOPPED[resource.stopped_by] ?? resource.stopped_by ?? '–');

@@ -98,10 +98,9 @@ static inline Real occlusion(constant const View *view, constant const Isosurfac
     constant const float *m = view->world_gradient_from_index;
     #define INDEX(v) real3(mad(m[0], v.x, mad(m[3], v.y, m[6] * v.z)), mad(m[1], v.x, mad(m[4], v.y, m[7] * v.z)), mad(m[2], v.x, mad(m[5], v.y, m[8] * v.z)))
     Real3 from = along(at, INDEX(n), (Real)(params->occlusion_start));
-    UInt pixel = as_UInt(p->row * (view->stride * view->full_width) + p->column * view->stride);
     Real hidden = (Real)(0.0f);
     for (int i = 0; i < params->occlusion_rays; i++) {
-        UInt4Lanes ctr = {pixel, (UInt)(view->sample), (UInt)(1u + i), (UInt)(view->stream)};
+        UInt4Lanes ctr = {p->pixel, as_UInt(p->sample), (UInt)(1u + i), (UInt)(view->stream)};
         UInt4Lanes u = philox(ctr, view->seed[0], view->seed[1]);
         Real turn = 6.2831853f * unit_open(u.a), r2 = unit_open(u.b), r = sqrt(r2), up = sqrt(1.0f - r2);
         Real x = r * cos(turn), y = r * sin(turn);

@@ -33,7 +33,7 @@ static inline void film_packet(constant const View *view, global float *film, gl
     x.v = column, y.v = row;
     for (int i = 0; i < LANES; i++)
         if (x.lane[i] < view->width && y.lane[i] < view->height)
-            film_add(film, counts, y.lane[i] * view->width + x.lane[i], view->width * view->height, view->sample,
+            film_add(film, counts, y.lane[i] * view->width + x.lane[i], view->width * view->height, view->held,
                      (float4)(red.lane[i], green.lane[i], blue.lane[i], opacity.lane[i]));
 }
 

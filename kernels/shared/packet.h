@@ -9,6 +9,7 @@
 #include "shared/camera.h"
 #include "shared/inner.h"
 #include "shared/lanes.h"
+#include "shared/places.h"
 #include "shared/rng.h"
 #include "shared/shade.h"
 #include "shared/volume.h"
@@ -17,7 +18,9 @@
 #define STRIDE 8
 
 typedef struct {
-    Int column, row;      // in this pass's pixels
+    Int column, row;      // in this pass's film
+    UInt pixel;           // its number in the full image
+    Int sample;           // its number in the pixel
     Mask inside;          // true in the picture
     Real x, y;            // image point in full-size pixels
     Ray ray;              // t_near > t_far if it misses
@@ -70,11 +73,10 @@ static inline Packet packet_at(constant const View *view, int2 corner, float mar
     p.column = corner.x + LANE_IDS % TILE_W;
     p.row = corner.y + LANE_IDS / TILE_W;
     p.inside = MASK(p.column < view->width) & MASK(p.row < view->height);
-    Int column = p.column * view->stride, row = p.row * view->stride;
-    UInt4Lanes ctr = {as_UInt(row * view->full_width + column), (UInt)(view->sample), (UInt)(0u), (UInt)(view->stream)};
+    Spot spot = spot_at(view, p.column, p.row);
+    p.pixel = spot.pixel, p.sample = spot.sample, p.x = spot.x, p.y = spot.y;
+    UInt4Lanes ctr = {p.pixel, as_UInt(p.sample), (UInt)(0u), (UInt)(view->stream)};
     p.jitter = view->jittered ? unit_open(philox(ctr, view->seed[0], view->seed[1]).a) : (Real)(view->place);
-    p.x = to_real(column) + view->offset[0];
-    p.y = to_real(row) + view->offset[1];
     p.ray = camera_ray(view, p.x, p.y);
     p.start = inner_position(along(p.ray.origin, p.ray.direction, p.jitter * view->step));
     p.pace = inner_way(scale3(p.ray.direction, (Real)(view->step)));

@@ -38,18 +38,6 @@ static inline void cost(global uint *tiles, Tile tile, uint steps) {
     if (tile.times > 0u) atomic_add(&tiles[tile.cost_at], steps);
 }
 
-// The offset of a sample in its pixel: `sample_offset` of src/run/sample_offsets.rs, which gives the reason.
-static inline float2 sample_offset(uint sample) {
-    if (sample < 4u) {
-        float angle = 0.2617994f + 2.0943951f * (float)sample;
-        return 0.5f + (sample ? 0.4714045f : 0.0f) * (float2)(cos(angle), sin(angle));
-    }
-    float u = ((float)((sample / 4u * 0xc13fa9a9u) >> 9) + 0.5f) * 0x1p-24f - 0.5f;
-    float v = ((float)((sample / 4u * 0x91e10da6u) >> 9) + 0.5f) * 0x1p-24f - 0.5f;
-    float2 rotated = sample % 4u < 2u ? (float2)(u, v) : (float2)(-v, u);
-    return 0.5f + (sample % 2u ? -rotated : rotated);
-}
-
 // Gives the free lanes the next pixels of the tile, from `taken` on. Returns the lanes that have a new one.
 static inline Mask take_pixels(constant const View *view, Tile tile, Mask alive, int *taken, Int *column, Int *row) {
     IntLanes free, next;

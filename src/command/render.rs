@@ -90,7 +90,8 @@ async fn render_here(args: &Arguments, scene: &mut Value) -> Result<(Vec<u8>, Va
         let update = updates.borrow_and_update().clone();
         if let Some(frame) = &update.frame {
             bar.set_position(u64::from(frame.samples));
-            bar.set_message(format!("error {:.3} %", 100.0 * frame.error.total));
+            let error = frame.error.total.map_or("not known yet".into(), |error| format!("{:.3} %", 100.0 * error));
+            bar.set_message(format!("error {error}"));
         }
         match (update.state, update.frame) {
             (State::Done, Some(last)) => {

@@ -122,6 +122,49 @@ impl Device {
     pub fn read<T: bytemuck::Pod>(&self, buffer: &Buffer, offset: usize, out: &mut [T]) -> Result<()> {
         read(&self.queue, buffer, offset, out)
     }
+
+    /// Reads `rows` rows of `length` values each, which begin every `pitch` bytes from `offset` on.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] if they are not all in the buffer, or when OpenCL fails.
+    pub fn read_rows<T: bytemuck::Pod>(
+        &self,
+        buffer: &Buffer,
+        offset: usize,
+        pitch: usize,
+        rows: usize,
+        length: usize,
+    ) -> Result<Vec<T>> {
+        let mut out = vec![T::zeroed(); rows * length];
+        let width = length * size_of::<T>();
+        if out.is_empty() {
+            return Ok(out);
+        }
+        let fits = width <= pitch && offset + (rows - 1) * pitch + width <= buffer.bytes;
+        let (true, Memory::Bytes(memory)) = (fits, &buffer.memory) else {
+            return Err(Error::internal("a read past the end of a device buffer, or of an image"));
+        };
+        let (from, to, region) = ([offset % pitch, offset / pitch, 0], [0; 3], [width, rows, 1]);
+        let data = out.as_mut_ptr().cast();
+        // SAFETY: the range was checked above, `out` has `rows` × `width` bytes of plain data, and the call blocks until it is filled.
+        let event = unsafe {
+            self.queue.enqueue_read_buffer_rect(
+                memory,
+                CL_BLOCKING,
+                from.as_ptr(),
+                to.as_ptr(),
+                region.as_ptr(),
+                pitch,
+                0,
+                width,
+                0,
+                data,
+                &[],
+            )
+        };
+        cl("reading rows of a buffer", event)?;
+        Ok(out)
+    }
 }
 
 /// [`Device::read`] by a queue of the device.

@@ -13,7 +13,7 @@ use crate::device_struct;
 use crate::error::Result;
 use crate::film::picture::Background;
 use crate::film::{Samples, Sums, srgb};
-use sums::{ControlSum, FilmSum, SUMS, sums_of_block, sums_of_control};
+use sums::{FilmSum, SUMS, sums_of_block};
 
 /// Bytes that lanes may read behind a film's last pixel.
 pub const PADDING: usize = 256;
@@ -47,12 +47,6 @@ device_struct! {
         pub tiles_wide: i32,
         /// 1 if squared deviations are summed.
         pub deviations: i32,
-        /// Pixels across of the control.
-        pub control_width: i32,
-        /// Pixels down of the control; 0 if there is none.
-        pub control_height: i32,
-        /// The control's stride in the film's pixels.
-        pub control_stride: i32,
     }
 }
 
@@ -86,7 +80,7 @@ fn variant(whole: bool) -> Variant {
 pub fn source() -> Source {
     Source {
         kernel: "encode",
-        words: || FilmSum::opencl_text() + &ControlSum::opencl_text(),
+        words: FilmSum::opencl_text,
         structs: || vec![Encode::LAYOUT],
         variants: || [true, false].map(variant).to_vec(),
         common: 2,
@@ -148,32 +142,24 @@ impl Encoder {
         self.picture.len() + self.sums.len()
     }
 
-    /// Encodes `main` and returns the sums for its error against `control`. Then the picture can be read.
+    /// Encodes `main` and returns the sums for its error. Then the picture can be read.
     ///
     /// # Errors
     /// [`crate::error::Error::Internal`] if the device has no room or the kernel fails.
-    pub fn encode(
-        &mut self,
-        device: &Device,
-        main: Set<'_>,
-        control: Option<Set<'_>>,
-        look: &EncodeSettings,
-    ) -> Result<Sums> {
+    pub fn encode(&mut self, device: &Device, main: Set<'_>, look: &EncodeSettings) -> Result<Sums> {
         let (width, height) = (main.samples.width, main.samples.height);
         let whole = main.samples.stride == 1 && [width, height] == self.size;
         let blocks = width.div_ceil(across(device.info().lanes as usize)) * height.div_ceil(2);
-        let controls = control.map_or(0, |c| c.samples.height);
-        let items = blocks + controls + if whole { 0 } else { self.size[1] };
+        let items = blocks + if whole { 0 } else { self.size[1] };
         if self.sums.len() < 4 * SUMS * items {
             self.sums = device.allocate(4 * SUMS * items)?;
         }
-        device.write(&mut self.settings, 0, bytemuck::bytes_of(&settings(main, control, look)))?;
+        device.write(&mut self.settings, 0, bytemuck::bytes_of(&settings(main, look)))?;
         let counts =
             main.samples.tiles.as_ref().map(|t| device.upload(bytemuck::cast_slice(&t.counts), 0)).transpose()?;
         let arguments = [
             ("settings", &self.settings),
             ("film", main.buffer),
-            ("control", control.map_or(main.buffer, |c| c.buffer)),
             ("counts", counts.as_ref().unwrap_or(&self.sums)),
             ("curve", &*self.curve),
             ("picture", &self.picture),
@@ -182,12 +168,10 @@ impl Encoder {
         device.run(&variant(whole), &arguments, items)?;
         let mut numbers = vec![[0.0f32; SUMS]; items];
         device.read(&self.sums, 0, &mut numbers)?;
-        let (of_film, others) = numbers.split_at(blocks);
-        let (of_control, of_picture) = others.split_at(controls);
+        let (of_film, of_picture) = numbers.split_at(blocks);
         let mut sums: Sums = of_film.iter().map(sums_of_block).sum();
         sums.block_count = (width / 2) * (height / 2);
         sums.clipped += of_picture.iter().map(|n| n[0] as u64).sum::<u64>();
-        sums.control = control.map(|c| sums_of_control(of_control, c.samples.pixels()));
         Ok(sums)
     }
 
@@ -202,7 +186,7 @@ impl Encoder {
     }
 }
 
-fn settings(main: Set<'_>, control: Option<Set<'_>>, look: &EncodeSettings) -> Encode {
+fn settings(main: Set<'_>, look: &EncodeSettings) -> Encode {
     let behind = match look.background {
         Background::Colour(behind) => behind,
         Background::Transparent => [0.0; 3],
@@ -210,7 +194,6 @@ fn settings(main: Set<'_>, control: Option<Set<'_>>, look: &EncodeSettings) -> E
     let int = |n: usize| n as i32;
     let main = main.samples;
     let tiles = main.tiles.as_ref().map_or([0; 2], |t| [int(t.side), int(t.wide)]);
-    let control = control.map_or([0; 3], |c| [int(c.samples.width), int(c.samples.height), int(c.samples.stride)]);
     Encode {
         width: int(main.width),
         height: int(main.height),
@@ -224,8 +207,5 @@ fn settings(main: Set<'_>, control: Option<Set<'_>>, look: &EncodeSettings) -> E
         tile: tiles[0],
         tiles_wide: tiles[1],
         deviations: look.deviations.into(),
-        control_width: control[0],
-        control_height: control[1],
-        control_stride: control[2],
     }
 }

@@ -123,8 +123,20 @@ device_struct! {
         pub most_steps: u32,
         /// 1 if the work-items resume the state that the launch before has left.
         pub resumed: i32,
-        /// Number of the sample in its film, from 0.
+        /// Number of the sample in its pixel, from 0; of the first one, if several lie side by side.
         pub sample: i32,
+        /// Samples that each pixel of the film has already.
+        pub held: i32,
+        /// The samples of a pixel lie side by side in the film of a probe: 2^`batch[0]` by 2^`batch[1]`.
+        pub batch: [i32; 2],
+        /// A probe has clusters of 2^`cluster` by 2^`cluster` pixels beside each other, every `stride` pixels.
+        pub cluster: i32,
+        /// 1 if each pixel has places of its own, as a probe's.
+        pub own_places: i32,
+        /// The shift of the R2 sequence by the seed, in units of 2⁻³².
+        pub place_shift: [u32; 2],
+        /// The places of the first four samples.
+        pub first_places: [f32; 8],
         /// The film's number. Each film has random numbers of its own.
         pub stream: u32,
         /// The request's seed.

@@ -1,64 +1,56 @@
-//! The error of a film, estimated from the film itself.
+//! The error of a film, estimated from the film itself. docs/error.md has the whole.
 
 use serde::Serialize;
 
-use super::Film;
-use super::rounds::SURE;
-use super::sums::Apart;
+use super::{Estimate, Film};
 
 /// The estimated error of a picture: root mean square over its pixels of the error of linear luminance, divided by the picture's mean
-/// luminance (absolute if that is 0). A part is null if it is not known apart from the others.
+/// luminance (absolute if that is 0). A part is null if it is not known, or not apart from the others.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Default)]
 pub struct ErrorEstimate {
-    /// The error of all parts together.
-    pub total: f64,
-    /// The standard error of the mean over the samples. If the halves of the samples agree better than those of random ones would, it is
-    /// the difference of the halves instead. They do so if the places in a pixel are spread evenly over an edge.
+    /// An upper bound of the error of all parts together, which 95 of 100 pictures keep. It is null if a part is not known yet.
+    pub total: Option<f64>,
+    /// The standard error of the mean over the samples.
     pub noise: Option<f64>,
-    /// The difference that halving the step made, less its noise; with that of following rays to their end, if they end early.
+    /// An upper bound of what the step costs; with what is behind the ends of rays, if they end early.
     pub discretisation: Option<f64>,
     /// The loss of a picture of fewer pixels than asked for.
     pub resolution: Option<f64>,
-    /// The contribution from behind the opacity at which rays end. It is null if a control has measured it together with the step's.
+    /// The contribution from behind the opacity at which rays end. It is null if a probe has measured it together with the step's.
     pub truncation: Option<f64>,
     /// The contribution of a field that is still being computed: the change since it had half its histories.
     pub field: Option<f64>,
 }
 
-/// The deviations of its noise by which the difference to the control may be wrong.
-const STEP_DEVIATIONS: f64 = 2.0;
+impl ErrorEstimate {
+    /// All parts but the noise.
+    pub fn bias(&self) -> f64 {
+        [self.discretisation, self.resolution, self.truncation, self.field].into_iter().flatten().fold(0.0, f64::hypot)
+    }
+}
 
 impl Film {
-    /// The error, estimated from the samples alone.
+    /// The error, estimated from the samples and the probe.
     pub fn error(&self) -> ErrorEstimate {
         let sums = &self.sums;
-        let pixels = self.main.pixels().max(1) as f64;
-        let mean = sums.luminance / pixels;
-        let relative = |absolute: f64| if mean > 0.0 { absolute / mean } else { absolute };
+        let is_whole = self.main.stride == 1;
         let block = sums.of_blocks();
-        let noise = match self.main.count {
-            // The mean of a 2×2 block takes a quarter of the noise's variance away.
-            0 | 1 => self.noisy.then(|| block * (4.0f64 / 3.0).sqrt()),
-            _ => Some(self.known_noise(SURE).0),
-        };
-        let (discretisation, joint) = match (&self.control, &sums.control, self.main.stride) {
-            (Some(control), Some(apart), 1) => self.against(control.count, apart),
-            _ if self.stepless => (Some(0.0), None),
-            _ if self.step_loss.is_some() => {
-                (self.step_loss.map(|loss| if mean > 0.0 { loss * mean } else { loss }), None)
-            }
-            _ => (None, None),
-        };
-        let resolution = (self.main.stride > 1).then_some(block);
-        // A control whose rays go to their end has measured what is behind the ends of the others.
-        let is_measured = self.to_the_end && discretisation.or(joint).is_some();
-        let truncation = (!is_measured).then(|| (sums.truncated / pixels).sqrt());
-        let parts = [noise, discretisation.or(joint), resolution, truncation];
-        let own = parts.iter().flatten().map(|e| e * e).sum::<f64>().sqrt();
-        let total = relative(own).hypot(self.field_error.unwrap_or(0.0));
+        let noise = self.noise_squared();
+        let discretisation = self.step_bound();
+        let resolution = (!is_whole).then_some(block);
+        // A probe whose rays go to their end has measured what is behind the ends of the others.
+        let is_measured = self.to_the_end && discretisation.is_some();
+        let truncation = (!is_measured).then(|| (sums.truncated / self.main.pixels().max(1) as f64).sqrt());
+        // The standard error is that of such pictures, not the error of this one.
+        let expected = self.probed_noise.and_then(|p| p.expected).map(|part| self.random_noise().0 * part.sqrt());
+        // A render that looks often enough would stop by a lucky estimate: it counts no less. The blocks of a picture of fewer pixels have its noise.
+        let upper = noise.map(|n| n.upper().sqrt().max(expected.unwrap_or(0.0))).or((!is_whole).then_some(0.0));
+        let rest = [resolution, truncation].into_iter().flatten();
+        let own = upper.zip(discretisation).map(|(noise, step)| rest.fold(noise.hypot(step), f64::hypot));
+        let relative = |absolute: f64| self.relative(absolute);
         ErrorEstimate {
-            total,
-            noise: noise.map(relative),
+            total: own.map(|own| relative(own).hypot(self.field_error.unwrap_or(0.0))),
+            noise: expected.or(noise.map(|n| n.value.max(0.0).sqrt())).map(relative),
             discretisation: discretisation.map(relative),
             resolution: resolution.map(relative),
             truncation: truncation.map(relative),
@@ -78,81 +70,128 @@ impl Film {
         ((sum / self.main.pixels().max(1) as f64).sqrt(), if squares > 0.0 { sum * sum / squares } else { 0.0 })
     }
 
-    /// The noise, and true if the samples are spread better than random ones by at least `deviations` deviations.
-    pub(crate) fn known_noise(&self, deviations: f64) -> (f64, bool) {
-        let (random, pixels) = self.random_noise();
-        let spread = self.halves.and_then(|h| h.noise(self.main.count, random, pixels, deviations));
-        spread.map_or((random, false), |noise| (noise, true))
+    /// True if the samples are spread better than random ones. Then the pixels' own variances are too large.
+    pub fn is_well_spread(&self) -> bool {
+        let ratio = self.probed_noise.and_then(|noise| noise.of_random);
+        ratio.is_some_and(|ratio| ratio.value + 2.0 * ratio.error < 1.0)
     }
 
-    /// The difference to the control, whose step is twice as long. A method of first order or better is at most this wrong: |I(h) − I| ≤
-    /// |I(2h) − I(h)|. A sample of the control is the proper one of the same number but for its step, so most of their noise is in common. The noise
-    /// of the difference is known from its halves, and it is taken off, less what it may be wrong by. Before the halves are known, it is a part of
-    /// the difference. With one sample it cannot be told from the picture's own noise, and the second value is both together. The m samples of the
-    /// control and the n proper ones also differ by the n − m that one of them lacks, with a variance of 1/m − 1/n of a sample's.
-    fn against(&self, control_samples: u32, apart: &Apart) -> (Option<f64>, Option<f64>) {
-        let (n, m) = (f64::from(self.main.count), f64::from(control_samples));
-        let pixels = apart.pixels.max(1) as f64;
-        if self.main.count < 2 {
-            return (None, Some((apart.squared / pixels).sqrt()));
+    /// The square of the noise, and its standard error. It is `None` if it is not known.
+    ///
+    /// The samples of a pixel are spread more evenly than random ones, so their variance is too large. The probe tells by how much: the ratio is
+    /// that of its pixels. One sample has no variance; the variance of blocks of pixels takes its place.
+    fn noise_squared(&self) -> Option<Estimate> {
+        let count = self.main.count;
+        if self.main.stride > 1 {
+            return None;
         }
-        let lacking = apart.variance * (1.0 / m - 1.0 / n).abs() / pixels;
-        let noise = lacking + self.step_noise.map_or(0.0, |halves| halves.squared_after(self.main.count));
-        // The noise is known to a relative variance of 2/ν of its square.
-        let doubt = STEP_DEVIATIONS * noise * (2.0 / pixels).sqrt();
-        (Some(((apart.squared / pixels - noise).max(0.0) + doubt).sqrt()), None)
+        if let Some(reduced) = self.reduced {
+            return Some(Estimate { value: self.absolute(reduced.noise?).powi(2), error: 0.0 });
+        }
+        let (random, pixels) = self.random_noise();
+        let squared = random * random;
+        // Of random paths, nothing found yet is not nothing there.
+        if self.noisy && self.sums.luminance == 0.0 {
+            return None;
+        }
+        match self.probed_noise {
+            Some(probed) if count < 2 => Some(probed.squared_of(self.sums.of_blocks().powi(2))),
+            Some(probed) => Some(probed.squared_of(squared)),
+            None if !self.noisy => None,
+            // The mean of a 2×2 block takes a quarter of random noise away.
+            None if count < 2 => Some(Estimate { value: self.sums.of_blocks().powi(2) * 4.0 / 3.0, error: 0.0 }),
+            // The squared error of a picture deviates from its own expected value by √(2/ν) of it.
+            None => Some(Estimate {
+                value: squared,
+                error: if pixels > 0.0 { squared * (2.0 / pixels).sqrt() } else { 0.0 },
+            }),
+        }
+    }
+
+    /// An upper bound of what the step costs, of luminance. It is `None` if it is not known.
+    fn step_bound(&self) -> Option<f64> {
+        if self.biased {
+            return None;
+        }
+        if self.stepless {
+            return Some(0.0);
+        }
+        match self.reduced {
+            Some(reduced) => Some(self.absolute(reduced.step)),
+            None => self.probed_step.map(|step| step.bound),
+        }
+    }
+
+    /// The luminance of an error that is relative to the mean luminance, if that is above 0.
+    fn absolute(&self, relative: f64) -> f64 {
+        let mean = self.sums.luminance / self.main.pixels().max(1) as f64;
+        if mean > 0.0 { relative * mean } else { relative }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Halves, Samples, Sums};
+    use super::super::probed::UPPER;
+    use super::super::{ProbedNoise, ProbedStep, Reduced, Samples, Sums};
     use super::*;
 
-    /// A film of 2 × 2 pixels of one luminance, with `count` samples of one variance each, and a control of another luminance.
-    fn film(luminance: f64, count: u32, variance: f64, control: Option<(f64, u32)>) -> Film {
-        let set = |count| Samples { width: 2, height: 2, stride: 1, count, ..Samples::default() };
-        let squared = variance / f64::from(count);
-        let apart = |(other, _): (f64, u32)| Apart {
-            squared: 4.0 * (luminance - other).powi(2),
-            variance: 4.0 * variance,
-            pixels: 4,
-        };
-        let sums = Sums {
-            luminance: 4.0 * luminance,
-            noise: 4.0 * squared,
-            noise_squares: 4.0 * squared * squared,
-            control: control.map(apart),
-            ..Sums::default()
-        };
-        let control = control.map(|(_, count)| set(count));
-        Film { size: [2, 2], main: set(count), sums, control, opacity_threshold: 1.0, ..Film::default() }
+    /// A film of 2 × 2 pixels of luminance 0.5 whose `count` samples have a variance of 0.09 each.
+    fn film(count: u32, noise: Option<ProbedNoise>, step: Option<f64>) -> Film {
+        let squared = 0.09 / f64::from(count);
+        let sums =
+            Sums { luminance: 2.0, noise: 4.0 * squared, noise_squares: 4.0 * squared * squared, ..Sums::default() };
+        let main = Samples { width: 2, height: 2, stride: 1, count, ..Samples::default() };
+        Film {
+            size: [2, 2],
+            main,
+            sums,
+            probed_noise: noise,
+            probed_step: step.map(|bound| ProbedStep { bound, twice: bound }),
+            opacity_threshold: 1.0,
+            ..Film::default()
+        }
     }
 
     #[test]
-    fn noise_is_the_standard_error_of_the_mean() {
+    fn random_noise_is_the_standard_error_of_the_mean_and_the_total_a_bound() {
         // Four samples with a variance of 0.09 a sample: the standard error is 0.3 / 2, relative to a mean of 0.5.
-        let error = film(0.5, 4, 0.09, None).error();
-        assert!((error.total - 0.3).abs() < 1e-12, "{error:?}");
-        assert_eq!(error.discretisation, None);
+        let error = Film { stepless: true, noisy: true, ..film(4, None, None) }.error();
+        assert!((error.noise.unwrap_or(f64::NAN) - 0.3).abs() < 1e-12, "{error:?}");
+        // Four pixels: the square has a relative standard error of √(2/4).
+        let bound = 0.3 * (1.0 + UPPER * 0.5f64.sqrt()).sqrt();
+        assert!((error.total.unwrap_or(f64::NAN) - bound).abs() < 1e-12, "{error:?}");
     }
 
     #[test]
-    fn the_control_tells_discretisation_from_noise() {
-        let error = film(0.5, 100, 0.0, Some((0.6, 1))).error();
-        let discretisation = error.discretisation.unwrap_or(0.0);
-        assert!((discretisation - 0.2).abs() < 1e-12 && (error.total - 0.2).abs() < 1e-12, "{error:?}");
+    fn what_is_not_known_is_not_zero() {
+        let error = film(1, None, None).error();
+        assert_eq!((error.total, error.noise, error.discretisation), (None, None, None));
+        let error = film(1, None, Some(0.0)).error();
+        assert_eq!((error.total, error.discretisation), (None, Some(0.0)), "one sample has no noise that is known");
+        let known = Some(ProbedNoise::default());
+        assert_eq!(film(4, known, None).error().total, None, "the step has not been tried");
+        let biased = Film { biased: true, ..film(4, known, Some(0.0)) };
+        assert_eq!(biased.error().total, None, "a bias that is not measured");
+        let black = Film { noisy: true, stepless: true, sums: Sums::default(), ..film(64, None, None) };
+        assert_eq!((black.error().total, black.error().noise), (None, None), "nothing found yet is not nothing there");
+        let reduced = Some(Reduced { step: 0.1, noise: None });
+        assert_eq!(Film { reduced, ..film(1, None, None) }.error().total, None);
+        let reduced = Some(Reduced { step: 0.3, noise: Some(0.4) });
+        let total = Film { reduced, ..film(1, None, None) }.error().total.unwrap_or(f64::NAN);
+        assert!((total - 0.5).abs() < 1e-12, "{total}");
     }
 
     #[test]
-    fn the_noise_of_the_difference_to_the_control_is_taken_off_less_its_doubt() {
-        // With as many samples of both, the noise of the samples plays no part.
-        let film = |step_noise| Film { step_noise, ..film(0.5, 4, 0.09, Some((0.6, 4))) };
-        let of = |step_noise| film(step_noise).error().discretisation.unwrap_or(0.0);
-        assert!((of(None) - 0.2).abs() < 1e-12, "before the halves are known all of it is the step's");
-        // Halves of 8 samples that are 0.05 apart: of 4 samples the square is twice that.
-        let (squared, doubt) = (0.01 - 0.005, 2.0 * 0.005 * 0.5f64.sqrt());
-        let halves = Some(Halves { samples: 8, apart: 0.05 });
-        assert!((of(halves) - 2.0 * (squared + doubt).sqrt()).abs() < 1e-12, "{}", of(halves));
+    fn a_probe_tells_how_well_samples_are_spread() {
+        let of = |value, error| Estimate { value, error };
+        let probed =
+            ProbedNoise { squared: of(0.01, 0.001), of_random: Some(of(0.25, 0.0)), random: 0.0225, expected: None };
+        let error = film(4, Some(probed), Some(0.03)).error();
+        assert!((error.noise.unwrap_or(f64::NAN) - 0.15).abs() < 1e-12, "{error:?}");
+        assert!((error.total.unwrap_or(f64::NAN) - 0.15f64.hypot(0.06)).abs() < 1e-12, "{error:?}");
+        // A picture that has no variance: the probe's own noise counts.
+        let error = film(1, Some(ProbedNoise { of_random: None, ..probed }), Some(0.0)).error();
+        assert!((error.noise.unwrap_or(f64::NAN) - 0.2).abs() < 1e-12, "{error:?}");
+        assert!((error.total.unwrap_or(f64::NAN) - (0.01f64 + UPPER * 0.001).sqrt() / 0.5).abs() < 1e-12, "{error:?}");
     }
 }

@@ -26,23 +26,10 @@ pub struct Sums {
     pub unknown: u64,
     /// The number of values of the picture that were clipped at white.
     pub clipped: u64,
-    /// The comparison with the control, if there is one.
-    pub control: Option<Apart>,
-}
-
-/// The difference of the samples to those of a control, at the control's pixels.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Apart {
-    /// The sum of the squared differences of luminance.
-    pub squared: f64,
-    /// The sum of the variance of one sample, if it is known.
-    pub variance: f64,
-    /// The number of pixels in these sums.
-    pub pixels: usize,
 }
 
 impl std::iter::Sum for Sums {
-    /// Adds the sums of parts of the pixels. The comparison with the control is known only for the whole, so it is that of the first part.
+    /// Adds the sums of parts of the pixels.
     fn sum<I: Iterator<Item = Self>>(parts: I) -> Self {
         parts.fold(Self::default(), |a, b| Self {
             luminance: a.luminance + b.luminance,
@@ -56,7 +43,6 @@ impl std::iter::Sum for Sums {
             pixels_between: a.pixels_between + b.pixels_between,
             unknown: a.unknown + b.unknown,
             clipped: a.clipped + b.clipped,
-            control: a.control.or(b.control),
         })
     }
 }

@@ -41,7 +41,7 @@ pub(super) fn frame_headers(frame: &Frame) -> Vec<(&'static str, String)> {
     let lowered = (!frame.lowered.is_none()).then(|| ("X-Cloudchamber-Lowered", frame.lowered.words().join("; ")));
     let always = [
         ("X-Cloudchamber-Samples", frame.samples.to_string()),
-        ("X-Cloudchamber-Error", format!("{:.6}", frame.error.total)),
+        ("X-Cloudchamber-Error", frame.error.total.map_or("unknown".into(), |error| format!("{error:.6}"))),
         ("X-Cloudchamber-Elapsed-Ms", format!("{:.1}", frame.elapsed_ms)),
         ("X-Cloudchamber-Final", frame.is_final.to_string()),
     ];

@@ -117,7 +117,7 @@ fn event(job: &Job, update: &Update) -> Event {
     let data = json!({
         "state": update.state,
         "samples": frame.map_or(0, |f| f.samples),
-        "error": frame.map(|f| f.error.total),
+        "error": frame.and_then(|f| f.error.total),
         "lowered": frame.map(|f| f.lowered.words()),
         "elapsed_ms": frame.map(|f| f.elapsed_ms),
         "device_ms": frame.map(|f| f.device_ms),

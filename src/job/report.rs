@@ -38,8 +38,8 @@ pub struct TracePoint {
     pub elapsed_ms: f64,
     /// The samples per pixel of this frame.
     pub samples: u32,
-    /// The error of this frame.
-    pub error: f64,
+    /// The error of this frame; null if it is not known yet.
+    pub error: Option<f64>,
     /// The pixels along a side that a sample of this frame stands for.
     pub stride: u32,
 }
@@ -127,8 +127,8 @@ pub struct Frame {
 pub(super) fn slope(trace: &[TracePoint]) -> Option<f64> {
     let points: Vec<(f64, f64)> = trace
         .iter()
-        .filter(|p| p.stride == 1 && p.samples >= 2 && p.error > 0.0)
-        .map(|p| (f64::from(p.samples), p.error))
+        .filter(|p| p.stride == 1 && p.samples >= 2)
+        .filter_map(|p| Some((f64::from(p.samples), p.error.filter(|error| *error > 0.0)?)))
         .collect();
     PowerLaw::through(&points).map(|l| l.power)
 }
@@ -139,7 +139,8 @@ mod tests {
 
     #[test]
     fn the_slope_of_noise_is_a_half() {
-        let point = |samples: u32, error: f64, stride: u32| TracePoint { elapsed_ms: 0.0, samples, error, stride };
+        let point =
+            |samples: u32, error: f64, stride: u32| TracePoint { elapsed_ms: 0.0, samples, error: Some(error), stride };
         let noise: Vec<TracePoint> = [2, 4, 9, 16].map(|n| point(n, 3.0 / f64::from(n).sqrt(), 1)).to_vec();
         assert!((slope(&noise).unwrap_or(0.0) + 0.5).abs() < 1e-12);
         assert_eq!(slope(&noise[..2]), None);

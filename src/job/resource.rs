@@ -27,7 +27,7 @@ impl Job {
         match &p.task {
             Task::Picture(scene) => json!({
                 "id": self.id, "state": p.state, "technique": scene.technique().name, "image": scene.image(),
-                "samples": p.samples, "error": p.error.map(|e| e.total), "created_unix_s": self.created_unix_s,
+                "samples": p.samples, "error": p.error.and_then(|e| e.total), "created_unix_s": self.created_unix_s,
             }),
             Task::File(task) => json!({
                 "id": self.id, "state": p.state, "technique": task.technique().name,
@@ -58,7 +58,7 @@ impl Job {
             "plan": {"technique": technique, "reasons": p.reasons, "planned": self.planned, "budget": {
                 "samples": budget.samples, "time_ms": budget.time_ms, "max_error": budget.max_error}},
             "samples": p.samples,
-            "error": p.error.map(|e| e.total),
+            "error": p.error.and_then(|e| e.total),
             "error_parts": p.error,
             "stopped_by": p.stopped_by,
             "failure": p.failure_words(),

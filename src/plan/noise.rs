@@ -1,7 +1,7 @@
 //! The noise, in two parts that fall differently with more samples: e_n² = P_n² + J² / n.
 //!
-//! P_n is the error of the sample places in a pixel, at edges above all. It is the same for every seed and, as long as the picture is much
-//! the same, for every setting. J² is the variance that random numbers bring into a sample, along its path or at the start of its steps.
+//! P_n is the error of the sample places in a pixel, at edges above all. All pilots have the picture's own places, whatever their seed. As long
+//! as the picture is much the same, it is the same for every setting. J² is the variance that random numbers bring into a sample, along its path or at the start of its steps.
 //! Every seed has another random part.
 
 use std::sync::Arc;

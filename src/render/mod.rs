@@ -61,6 +61,7 @@ pub struct Scene {
     background: Background,
     budget: Budget,
     seed: u64,
+    places: u64,
     pilot: Option<Region>,
 }
 
@@ -120,6 +121,7 @@ impl Scene {
             background,
             budget,
             seed: request.seed.unwrap_or(0),
+            places: request.seed.unwrap_or(0),
             pilot: None,
         };
         scene.prepared_for_subject()
@@ -174,7 +176,7 @@ impl Scene {
         Self { pilot: Some(region), budget: Budget { samples, time_ms: None, max_error: None }, ..self }
     }
 
-    /// The same scene with another seed.
+    /// The same scene with another seed, but with the same places in a pixel: a pilot's have the picture's error.
     pub(crate) fn with_seed(self, seed: u64) -> Self {
         Self { seed, ..self }
     }
@@ -260,9 +262,13 @@ impl Scene {
     pub fn budget(&self) -> Budget {
         self.budget
     }
-    /// The seed of every random number.
+    /// The seed of every random number but those of the places in a pixel.
     pub fn seed(&self) -> u64 {
         self.seed
+    }
+    /// The seed of the places in a pixel. It is that of the request.
+    pub fn places(&self) -> u64 {
+        self.places
     }
 }
 

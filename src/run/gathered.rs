@@ -1,16 +1,16 @@
 //! The samples that a view has gathered on the device, and the films that are made of them.
 
-use std::collections::VecDeque;
 use std::rc::Rc;
 use std::time::Duration;
 
 use super::context::DeviceContext;
 use super::layer::Layer;
 use super::motion::Moving;
+use super::probe::{CLOSELY, Probe, Steps};
 use super::rounds::Rounds;
-use crate::device::Buffer;
 use crate::device::encode::{EncodeSettings, Encoder, Set};
 use crate::device::enums::{Count, DeviceEnum};
+use crate::device::{Buffer, Device};
 use crate::error::Result;
 use crate::film::picture::Background;
 use crate::film::{Film, Lowered};
@@ -18,15 +18,17 @@ use crate::job::SampleCounts;
 use crate::render::Scene;
 use crate::technique::{Random, ViewPlan};
 
-/// The stride of the control if the picture's shorter side has at least 400 pixels, at least 100, or fewer. A thousand pixels and more tell the
-/// error.
-const CONTROL: [usize; 3] = [8, 4, 2];
+/// The stride of the preview if the picture's shorter side has at least 400 pixels, at least 100, or fewer.
+const PREVIEW: [usize; 3] = [8, 4, 2];
 
 /// The layer that a pass samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Pass {
-    Control,
+    /// The first picture, of few pixels and at twice the step.
+    Preview,
     Main,
+    /// Samples of the picture's probe.
+    Probe,
     /// The picture of a moving camera, reduced so that it is in time.
     Moving,
 }
@@ -35,8 +37,10 @@ pub(super) enum Pass {
 pub(super) struct Gathered {
     /// The size of the picture.
     pub size: [usize; 2],
-    /// The control, and the layer of the main passes.
+    /// The preview, and the layer of the main passes.
     pub layers: [Layer; 2],
+    /// The probe of a picture whose samples are spread evenly. A pilot has none.
+    pub probe: Option<Probe>,
     /// The picture of a moving camera, reduced so that it is in time.
     pub moving: Option<Moving>,
     pub rounds: Rounds,
@@ -46,8 +50,9 @@ pub(super) struct Gathered {
     pub field_error: Option<f64>,
     random: Option<Random>,
     stepless: bool,
+    biased: bool,
     opacity_threshold: f64,
-    /// True if the control's rays go to their end, where others end early.
+    /// True if the probe's rays go to their end at longer steps, where others end early.
     to_the_end: bool,
     background: Background,
     encoder: Encoder,
@@ -58,37 +63,44 @@ pub(super) struct Gathered {
 }
 
 impl Gathered {
-    /// Room for the samples that `plan` takes of a scene, with the tables of twice its step and of its step. The memory of `before` is used again
-    /// if it has the same size. `to_the_end` is true if the control's rays go to their end, where others end early.
+    /// Room for the samples that `plan` takes of a scene; `table` makes the kernel's table for a step. The memory of `before` is used again if it has
+    /// the same size. `to_the_end` is true if the probe's rays go to their end, where others end early.
     pub fn new(
         context: &mut DeviceContext,
         scene: &Scene,
-        [of_control, of_main]: [Rc<Buffer>; 2],
+        mut table: impl FnMut(&Device, f32) -> Result<Rc<Buffer>>,
         plan: &ViewPlan,
-        to_the_end: bool,
+        (to_the_end, smallest_side): (bool, f32),
         before: Option<Self>,
     ) -> Result<Self> {
         let region = scene.region();
         let size = region.size.map(|n| n.div_ceil(region.stride) as usize);
-        let (room, encoder) = before.map(|b| (b.layers.map(|l| l.buffer).into(), b.encoder)).unzip();
+        let (room, encoder) = before.map(|b| ((b.layers.map(|l| l.buffer), b.probe), b.encoder)).unzip();
+        let ([of_preview, of_main], of_probe) =
+            room.map_or(([None, None], None), |(layers, probe)| (layers.map(Some), probe.map(|p| p.layer.buffer)));
         let encoder = Encoder::new(&mut context.device, &context.curve, size, scene.background(), encoder)?;
         let device = &context.device;
         let sparse = match size[0].min(size[1]) {
-            400.. => CONTROL[0],
-            100.. => CONTROL[1],
-            _ => CONTROL[2],
+            400.. => PREVIEW[0],
+            100.. => PREVIEW[1],
+            _ => PREVIEW[2],
         };
-        let mut room: VecDeque<Buffer> = room.unwrap_or_default();
-        let mut layer = |table, stride, step| Layer::new(device, scene, table, stride, 0, step, room.pop_front());
+        let mut layer = |stride, step, room| Layer::new(device, scene, table(device, step)?, stride, step, 1, room);
+        let layers = [layer(sparse, 2.0 * plan.step, of_preview)?, layer(1, plan.step, of_main)?];
+        let steps = Steps { step: plan.step, stepless: plan.stepless, smallest_side };
+        let is_probed = scene.view().random().is_none() && !scene.is_pilot();
+        let probe = || Probe::new(device, scene, steps, |step| table(device, step), of_probe);
         Ok(Self {
             size,
-            layers: [layer(of_control, sparse, 2.0 * plan.step)?, layer(of_main, 1, plan.step)?],
+            layers,
+            probe: is_probed.then(probe).transpose()?,
             moving: None,
             rounds: Rounds::new(scene.is_pilot()),
             counts: device.upload(&[0; 32], 0)?,
             field_error: None,
             random: scene.view().random(),
             stepless: plan.stepless,
+            biased: plan.biased,
             opacity_threshold: plan.opacity_threshold,
             to_the_end,
             background: scene.background(),
@@ -102,6 +114,7 @@ impl Gathered {
     pub fn restart(&mut self, context: &DeviceContext) -> Result<()> {
         context.device.write(&mut self.counts, 0, &[0; 32])?;
         self.layers.iter_mut().try_for_each(|layer| layer.restart(&context.device))?;
+        self.probe.iter_mut().for_each(Probe::restart);
         self.rounds.forget();
         (self.field_error, self.encoded) = (None, None);
         Ok(())
@@ -115,43 +128,60 @@ impl Gathered {
     /// The bytes on the device.
     pub fn bytes(&self) -> usize {
         let moving = self.moving.as_ref().map_or(0, |m| m.layer.buffer.len());
-        self.layers.iter().map(|l| l.buffer.len()).sum::<usize>() + self.encoder.bytes() + moving
+        let probe = self.probe.as_ref().map_or(0, |p| p.layer.buffer.len());
+        self.layers.iter().map(|l| l.buffer.len()).sum::<usize>() + self.encoder.bytes() + moving + probe
     }
 
     pub fn layer(&self, pass: Pass) -> &Layer {
-        layer(&self.layers, self.moving.as_ref(), pass)
+        match (pass, &self.moving, &self.probe) {
+            (Pass::Moving, Some(moving), _) => &moving.layer,
+            (Pass::Probe, _, Some(probe)) => &probe.layer,
+            (Pass::Preview, ..) => &self.layers[0],
+            _ => &self.layers[1],
+        }
     }
 
     pub fn layer_mut(&mut self, pass: Pass) -> &mut Layer {
-        match (pass, &mut self.moving) {
-            (Pass::Moving, Some(moving)) => &mut moving.layer,
-            (Pass::Control, _) => &mut self.layers[0],
+        match (pass, &mut self.moving, &mut self.probe) {
+            (Pass::Moving, Some(moving), _) => &mut moving.layer,
+            (Pass::Probe, _, Some(probe)) => &mut probe.layer,
+            (Pass::Preview, ..) => &mut self.layers[0],
             _ => &mut self.layers[1],
         }
     }
 
-    /// The next pass.
-    pub fn next_pass(&self) -> Pass {
-        if self.moving.as_ref().is_some_and(|m| m.layer.samples == 0) && self.samples() == 0 {
-            return Pass::Moving;
-        }
-        let [control, main] = &self.layers;
-        let owed = match main.samples {
-            // Without a step the control is only the first picture: there is no error of a step to control.
-            _ if self.stepless => 1,
-            // A sample of the control is the main sample of the same number but for its step. Otherwise noise would pass for the step's error, or
-            // hide it.
-            n => n + 1,
-        };
-        if control.samples < owed { Pass::Control } else { Pass::Main }
+    /// The kernels' counters in a pass.
+    pub fn counts(&self, pass: Pass) -> &Buffer {
+        self.probe.as_ref().filter(|_| pass == Pass::Probe).map_or(&self.counts, |probe| &probe.counts)
     }
 
-    /// The layer to show: the main one, or before its first pass the picture of the moving camera, or else the control.
+    /// True if the probe is to follow the picture. Without a wish for its error, it waits until there are a few samples.
+    pub fn owes_probe(&self, error_is_wanted: bool) -> bool {
+        let samples = self.samples();
+        let due = samples >= CLOSELY || (samples > 0 && error_is_wanted);
+        due && self.probe.as_ref().is_some_and(|probe| probe.is_owed(samples))
+    }
+
+    /// The next pass. `preview` is true if a preview may be shown.
+    pub fn next_pass(&self, preview: bool, error_is_wanted: bool) -> Pass {
+        let samples = self.samples();
+        if samples == 0 && self.moving.as_ref().is_some_and(|m| m.layer.samples == 0) {
+            Pass::Moving
+        } else if samples == 0 && preview && self.layers[0].samples == 0 {
+            Pass::Preview
+        } else if self.owes_probe(error_is_wanted) {
+            Pass::Probe
+        } else {
+            Pass::Main
+        }
+    }
+
+    /// The layer to show: the main one, or before its first pass the picture of the moving camera, or else the preview.
     fn shown(&self) -> Pass {
         match &self.moving {
             _ if self.samples() > 0 => Pass::Main,
             Some(moving) if moving.layer.samples > 0 => Pass::Moving,
-            _ => Pass::Control,
+            _ => Pass::Preview,
         }
     }
 
@@ -179,42 +209,40 @@ impl Gathered {
         let pass = self.shown();
         // A single sample per pixel has no deviation. Its deviations only mark the pixels whose sample was not finite.
         self.counted = self.read_counts(context)?;
-        let Self { layers, moving, encoder, counted, .. } = self;
-        let shown = layer(layers, moving.as_ref(), pass);
-        let main = shown.unread();
-        let controlled = pass == Pass::Main && layers[0].samples > 0 && !self.stepless;
-        let control = controlled.then(|| layers[0].unread());
+        let counted = self.counted;
+        let main = self.layer(pass).unread();
         let settings = EncodeSettings {
             size: self.size,
             background: self.background,
             opacity_threshold: self.opacity_threshold,
             deviations: main.count > 1 || main.tiles.is_some() || counted.non_finite > 0,
         };
-        let of_control = control.as_ref().map(|samples| Set { buffer: &layers[0].buffer, samples });
-        let of_main = Set { buffer: &shown.buffer, samples: &main };
-        let sums = encoder.encode(&context.device, of_main, of_control, &settings)?;
+        let shown = layer(&self.layers, self.moving.as_ref(), pass);
+        let sums = self.encoder.encode(&context.device, Set { buffer: &shown.buffer, samples: &main }, &settings)?;
         let twice = if self.stepless { 1.0 } else { 2.0 };
-        let (lowered, step_loss) = match (pass, moving) {
-            (Pass::Moving, Some(moving)) => (moving.lowered, Some(moving.step_loss)),
-            (Pass::Control, _) => (Lowered { stride: layers[0].stride as u32, step: twice }, None),
+        let (lowered, reduced) = match (pass, &self.moving) {
+            (Pass::Moving, Some(moving)) => (moving.lowered, Some(moving.losses)),
+            (Pass::Preview, _) => (Lowered { stride: self.layers[0].stride as u32, step: twice }, None),
             _ => (Lowered::default(), None),
         };
+        let probe = self.probe.as_ref().filter(|_| pass == Pass::Main);
+        let probed_noise = probe.and_then(|probe| probe.noise(context, &self.layers[1]).transpose()).transpose()?;
         Ok(Film {
             size: self.size,
             main,
             sums,
-            control,
+            probed_noise,
+            probed_step: probe.and_then(Probe::step),
             stepless: self.stepless,
+            biased: self.biased,
             noisy: self.random.is_some(),
             opacity_threshold: self.opacity_threshold,
             to_the_end: self.to_the_end,
             field_error: self.field_error,
             background: self.background,
             lowered,
-            step_loss,
-            halves: self.rounds.halves(),
-            step_noise: self.rounds.step_noise(),
-            rounds: self.rounds.on_the_way(),
+            reduced,
+            rounds: self.rounds.all(),
         })
     }
 
@@ -228,15 +256,18 @@ impl Gathered {
         let mut film = self.encode(context)?;
         let deviations = film.main.count > 1 || film.main.tiles.is_some() || film.sums.unknown > 0;
         film.main = self.layer(self.shown()).read(context, deviations)?;
-        film.control = film.control.map(|_| self.layers[0].read(context, false)).transpose()?;
         Ok(film)
     }
 
-    /// Keeps the picture after a main pass, if its halves are to be compared.
+    /// Keeps the picture after a main pass, if it is a pilot's and the planner wants to see it.
     pub fn keep_round(&mut self, context: &DeviceContext, device_time: Duration) -> Result<()> {
-        let [control, main] = &self.layers;
-        let control = (!self.stepless).then_some(control);
-        self.rounds.passed(context, main, control, device_time)
+        self.rounds.passed(context, &self.layers[1], device_time)
+    }
+
+    /// Takes over the samples of a pass of the probe.
+    pub fn probe_passed(&mut self, context: &DeviceContext) -> Result<()> {
+        let Self { probe, layers, to_the_end, .. } = self;
+        probe.iter_mut().try_for_each(|probe| probe.passed(context, &layers[1], *to_the_end))
     }
 
     fn read_counts(&self, context: &DeviceContext) -> Result<SampleCounts> {
@@ -256,10 +287,11 @@ impl Gathered {
     }
 }
 
+/// The layer of a pass that may be shown.
 fn layer<'a>(layers: &'a [Layer; 2], moving: Option<&'a Moving>, pass: Pass) -> &'a Layer {
     match (pass, moving) {
         (Pass::Moving, Some(moving)) => &moving.layer,
-        (Pass::Control, _) => &layers[0],
+        (Pass::Preview, _) => &layers[0],
         _ => &layers[1],
     }
 }

@@ -11,6 +11,15 @@ use crate::film::Samples;
 use crate::render::Scene;
 use crate::technique::TILE;
 
+/// The samples of a pass that lie side by side in the film of a probe: 2^`across` by 2^`down` of each pixel.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Batch {
+    pub across: u32,
+    pub down: u32,
+    /// Its pixels lie in clusters of 2^`cluster` by 2^`cluster`.
+    pub cluster: u32,
+}
+
 /// One set of samples on the device.
 pub(super) struct Layer {
     pub buffer: Buffer,
@@ -24,14 +33,17 @@ pub(super) struct Layer {
     pub table: Rc<Buffer>,
     /// Its step, world units.
     pub step: f32,
-    /// The number of its random stream. The control has the main layer's, so that both have the same random numbers.
+    /// The number of its random stream.
     pub stream: u32,
+    /// The samples of a pass, if it is a probe's.
+    pub batch: Option<Batch>,
     /// The tiles that its passes sample, if the view renders tiles.
     tiling: Option<(Tiling, Buffer)>,
 }
 
 impl Layer {
-    /// Room for every `stride`-th pixel of a scene's picture, or of a pilot's pixels. It is `room` itself if that has the same size.
+    /// Room for every `stride`-th pixel of a scene's picture, or of a pilot's pixels, with as many `films` side by side. It is `room` itself if that
+    /// has the same size.
     ///
     /// # Errors
     /// [`crate::error::Error::Internal`] when the device has no room.
@@ -40,8 +52,8 @@ impl Layer {
         scene: &Scene,
         table: Rc<Buffer>,
         stride: usize,
-        stream: u32,
         step: f32,
+        films: usize,
         room: Option<Buffer>,
     ) -> Result<Self> {
         let region = scene.region();
@@ -53,8 +65,9 @@ impl Layer {
             Ok((tiling, buffer))
         };
         let tiling = scene.view().random().map(tiled).transpose()?;
-        let buffer = device.allocate_in(room, 20 * width * height + PADDING)?;
-        Ok(Self { buffer, width, height, stride, picture_stride, samples: 0, table, step, stream, tiling })
+        let buffer = device.allocate_in(room, 20 * films * width * height + PADDING)?;
+        let (samples, stream, batch) = (0, 0, None);
+        Ok(Self { buffer, width, height, stride, picture_stride, samples, table, step, stream, batch, tiling })
     }
 
     /// Forgets the samples.
@@ -100,13 +113,20 @@ impl Layer {
         Ok(())
     }
 
+    /// The size of the film of a pass.
+    pub fn film_size(&self) -> [usize; 2] {
+        let [across, down] = self.batch.map_or([0; 2], |batch| [batch.across, batch.down]);
+        [self.width << across, self.height << down]
+    }
+
     /// The work-items of a pass, and the approximate number of rays of each.
     pub fn items(&self, lanes: usize) -> (usize, usize) {
         if let Some((tiling, _)) = &self.tiling {
             return tiling.items(lanes);
         }
         let [beam_w, beam_h] = beam_pixels(lanes);
-        (self.width.div_ceil(beam_w) * self.height.div_ceil(beam_h), beam_w * beam_h)
+        let [width, height] = self.film_size();
+        (width.div_ceil(beam_w) * height.div_ceil(beam_h), beam_w * beam_h)
     }
 
     /// The description of the samples, without their values.

@@ -6,7 +6,7 @@ use super::context::DeviceContext;
 use super::layer::Layer;
 use crate::device::Buffer;
 use crate::error::Result;
-use crate::film::{Film, Lowered};
+use crate::film::{Film, Lowered, Reduced};
 use crate::render::Scene;
 
 /// The time of a frame in a smooth motion, ms: the rate of most screens, with room for delays. It applies if it loses no more than [`MOST_LOSS`].
@@ -89,12 +89,12 @@ impl Motion {
 
     /// The reduction of a picture of `rays` rays that take `ray_ms` each, and the loss of its longer step. It loses the least of all reductions
     /// that are in time; nothing is reduced if the whole picture is in time. Unknown losses are taken to be equal.
-    pub fn least(&mut self, rays: f64, ray_ms: f64, stepless: bool) -> (Lowered, f64) {
+    pub fn least(&mut self, rays: f64, ray_ms: f64, stepless: bool) -> (Lowered, Reduced) {
         self.is_smooth = true;
         if rays * ray_ms <= self.smooth.device_ms {
-            return (Lowered::default(), 0.0);
+            return (Lowered::default(), Reduced { step: 0.0, noise: None });
         }
-        let unknown = Losses { resolution: 1.0, step: (!stepless).then_some(1.0) };
+        let unknown = Losses { resolution: 1.0, step: (!stepless).then_some(1.0), noise: None };
         let losses = self.losses.unwrap_or(unknown);
         let mut lowered = losses.least(rays, ray_ms, self.smooth.device_ms);
         self.is_smooth =
@@ -102,7 +102,7 @@ impl Motion {
         if !self.is_smooth {
             lowered = losses.least(rays, ray_ms, self.steady.device_ms);
         }
-        (lowered, losses.of_step(lowered.step))
+        (lowered, Reduced { step: losses.of_step(lowered.step), noise: losses.noise })
     }
 }
 
@@ -121,13 +121,16 @@ struct Losses {
     resolution: f64,
     /// The loss of twice the step; `None` if the step plays no part.
     step: Option<f64>,
+    /// The noise of one sample per pixel, if it is known.
+    noise: Option<f64>,
 }
 
 impl Losses {
     /// The losses that a whole picture of a single sample per pixel shows.
     fn of(film: &Film) -> Option<Self> {
         let is_whole = film.main.count == 1 && film.lowered.is_none();
-        is_whole.then(|| Self { resolution: film.resolution_loss(), step: film.step_loss_seen() })
+        let noise = film.error().noise;
+        is_whole.then(|| Self { resolution: film.resolution_loss(), step: film.step_loss_seen(), noise })
     }
 
     /// The loss of a reduction. The loss of resolution is taken to come from edges, and grows with the stride.
@@ -156,8 +159,7 @@ impl Losses {
 pub(super) struct Moving {
     pub layer: Layer,
     pub lowered: Lowered,
-    /// The relative loss of its longer step.
-    pub step_loss: f64,
+    pub losses: Reduced,
 }
 
 impl Moving {
@@ -171,7 +173,7 @@ impl Moving {
         table: Rc<Buffer>,
         step: f32,
         lowered: Lowered,
-        step_loss: f64,
+        losses: Reduced,
         before: Option<Self>,
     ) -> Result<Self> {
         let layer = match before {
@@ -181,10 +183,13 @@ impl Moving {
             }
             _ => {
                 let room = before.map(|b| b.layer.buffer);
-                Layer::new(&context.device, scene, table, lowered.stride as usize, STREAM, lowered.step * step, room)?
+                let (stride, step) = (lowered.stride as usize, lowered.step * step);
+                let mut layer = Layer::new(&context.device, scene, table, stride, step, 1, room)?;
+                layer.stream = STREAM;
+                layer
             }
         };
-        Ok(Self { layer, lowered, step_loss })
+        Ok(Self { layer, lowered, losses })
     }
 
     /// The time of a ray of the whole picture, if that has `rays` rays and a pass of this picture took `pass_ms`.
@@ -199,14 +204,14 @@ mod tests {
 
     #[test]
     fn what_matters_least_is_lowered_and_no_more_than_need_be() {
-        let losses = Losses { resolution: 0.02, step: Some(0.001) };
+        let losses = Losses { resolution: 0.02, step: Some(0.001), noise: None };
         // 100 rays of 1 ms have 40 ms: a step of four times leaves 38 ms and loses 0.5 %.
         assert_eq!(losses.least(100.0, 1.0, 40.0), Lowered { stride: 1, step: 4.0 });
         assert_eq!(losses.least(100.0, 0.2, 30.0), Lowered { stride: 1, step: 1.0 });
         // Every second pixel loses 2 %, and a longer step 10 % and more.
-        let rough = Losses { resolution: 0.02, step: Some(0.1) };
+        let rough = Losses { resolution: 0.02, step: Some(0.1), noise: None };
         assert_eq!(rough.least(100.0, 1.0, 40.0), Lowered { stride: 2, step: 1.0 });
-        let stepless = Losses { resolution: 0.02, step: None };
+        let stepless = Losses { resolution: 0.02, step: None, noise: None };
         assert_eq!(stepless.least(200.0, 1.0, 30.0), Lowered { stride: 4, step: 1.0 });
         // No reduction is in time, so the cheapest one is taken.
         assert_eq!(losses.least(1e9, 1.0, 30.0), Lowered { stride: MOST_STRIDE, step: 4.0 });
@@ -219,7 +224,7 @@ mod tests {
 
     #[test]
     fn frames_that_come_late_leave_the_device_less() {
-        let mut motion = motion(Losses { resolution: 0.001, step: None });
+        let mut motion = motion(Losses { resolution: 0.001, step: None, noise: None });
         let first = motion.least(1e6, 1e-4, true).0;
         (0..5).for_each(|_| motion.learn(90.0));
         assert!(motion.least(1e6, 1e-4, true).0.stride > first.stride);
@@ -231,14 +236,14 @@ mod tests {
     #[test]
     fn a_motion_is_smooth_where_little_is_lost_and_else_steady() {
         // 30 ms of rays have 13 ms: a step of four times is in time.
-        let mut gentle = motion(Losses { resolution: 0.5, step: Some(0.01) });
-        let (lowered, loss) = gentle.least(3e5, 1e-4, false);
+        let mut gentle = motion(Losses { resolution: 0.5, step: Some(0.01), noise: None });
+        let (lowered, losses) = gentle.least(3e5, 1e-4, false);
         assert_eq!(lowered, Lowered { stride: 1, step: 4.0 });
-        assert!((loss - 0.05).abs() < 1e-12);
+        assert!((losses.step - 0.05).abs() < 1e-12);
         assert!(gentle.is_smooth);
         // A step of twice would bring 20 ms of rays in time, but lose 20 %. So the whole picture is rendered, 30 times per second.
-        let mut rough = motion(Losses { resolution: 0.5, step: Some(0.2) });
-        assert_eq!(rough.least(2e5, 1e-4, false), (Lowered::default(), 0.0));
+        let mut rough = motion(Losses { resolution: 0.5, step: Some(0.2), noise: None });
+        assert_eq!(rough.least(2e5, 1e-4, false), (Lowered::default(), Reduced { step: 0.0, noise: None }));
         assert!(!rough.is_smooth);
         // Unknown losses are not risked either.
         let mut unknown = Motion::new();

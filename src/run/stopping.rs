@@ -17,9 +17,9 @@ pub(super) enum Next {
     Stop(&'static str),
 }
 
-/// Decides after a pass. The error is read after 2, 3, 4, 6, 8, 12, … samples, a fixed order, so that the same request stops at the same sample. If
+/// Decides after a pass. The error is read after 1, 2, 3, 4, 6, 8, 12, … samples, a fixed order, so that the same request stops at the same sample. If
 /// the step, not the noise, keeps the error above the requested one, the step is halved. If it cannot be halved any more, the render stops and says
-/// so.
+/// so. An error that is not known stops nothing.
 pub(super) fn next(view: &mut ViewRun, started: Instant, context: &DeviceContext) -> Result<Next> {
     let (samples, budget) = (view.samples(), view.scene().budget());
     if samples >= budget.samples {
@@ -28,13 +28,13 @@ pub(super) fn next(view: &mut ViewRun, started: Instant, context: &DeviceContext
     if budget.time_ms.is_some_and(|ms| started.elapsed().as_millis() >= u128::from(ms)) {
         return Ok(Next::Stop("time"));
     }
-    let enough = samples >= if view.is_random() { Random::LEAST_SAMPLES } else { 2 };
+    let enough = !view.is_random() || samples >= Random::LEAST_SAMPLES;
     let Some(most) = budget.max_error.filter(|_| enough && is_round(samples)) else { return Ok(Next::GoOn) };
     let film = view.gathered.encode(context)?;
     let error = film.error();
-    let noise = error.noise.unwrap_or(0.0);
-    let bias = (error.total.powi(2) - noise.powi(2)).max(0.0).sqrt();
-    if error.total <= most {
+    let Some(total) = error.total else { return Ok(Next::GoOn) };
+    let (noise, bias) = (error.noise.unwrap_or(0.0), error.bias());
+    if total <= most {
         Ok(Next::Stop("error"))
     } else if bias > 0.7 * most && samples >= 4 && noise < bias {
         // A shorter step does not bring back what is behind the ends of rays.

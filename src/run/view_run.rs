@@ -1,8 +1,7 @@
 //! A view on the device: its buffers and the order of its passes.
 //!
-//! The control comes first: every eighth pixel, or more of a small picture, at twice the step. It is also the first picture. The main passes
-//! follow. The control gets another sample each time their number has doubled, so that it costs little and still tells the error. If the two differ
-//! by the step alone, the control gets a sample for each main pass.
+//! If somebody watches and it takes long, a preview comes first: every eighth pixel, or more of a small picture, at twice the step. The main passes
+//! follow. After 1, 2, 4, 8, … of them the probe follows, which tells their error.
 
 mod launch;
 mod passes;
@@ -19,6 +18,7 @@ use super::distances::distances;
 use super::gathered::{Gathered, Pass};
 use super::layer::packets_of_beam;
 use super::motion::{Motion, Moving};
+use super::places::Places;
 use super::warnings::warnings;
 use crate::device::structs::View as DeviceView;
 use crate::device::{Buffer, Device, Resume, SliceLength};
@@ -46,7 +46,7 @@ pub(super) struct ViewRun {
     /// The distances of the macro-cells, if the kernel does not read their ranges.
     distances: Option<Rc<Buffer>>,
     parameters: Buffer,
-    /// The control's own parameters, if its rays alone go to their end.
+    /// The probe's own parameters, if its rays alone go to their end.
     to_the_end: Option<Buffer>,
     view_buffer: Buffer,
     /// The camera and image, alone and with the pass under way.
@@ -62,8 +62,11 @@ pub(super) struct ViewRun {
     /// The launch that has left work undone: its work-items, and its time so far.
     undone: Option<(usize, Duration)>,
     slice_length: SliceLength,
-    /// True if the first pass is likely to be over before a picture of the control could be seen.
+    /// True if the first pass is likely to be over before a preview could be seen.
     quick: bool,
+    /// True if somebody watches.
+    pub is_followed: bool,
+    places: Places,
     pass_time: Duration,
     /// The shortest slice of the pass under way.
     shortest_slice: Duration,
@@ -94,10 +97,11 @@ impl ViewRun {
         };
         let bounds = prepared.volume().map_or(*scene.subject().bounds(), |volume| Bounds::from(&**volume));
         let view = device_view(&scene, &*prepared, &bounds);
-        let table = |step| table(&context.device, volume.as_deref(), &scene, &*prepared, step);
-        let tables = [table(2.0 * plan.step)?, table(plan.step)?];
+        let table = |device: &Device, step| table(device, volume.as_deref(), &scene, &*prepared, step);
         let to_the_end = prepared.parameters_to_the_end(scene.camera());
-        let gathered = Gathered::new(context, &scene, tables, &plan, to_the_end.is_some(), before)?;
+        let smallest = prepared.volume().map_or(bounds.smallest_side(), |volume| volume.smallest_side());
+        let probed = (to_the_end.is_some(), smallest as f32);
+        let gathered = Gathered::new(context, &scene, table, &plan, probed, before)?;
         let device = &context.device;
         let parameters = device.upload(&prepared.parameters(scene.camera()), 0)?;
         let to_the_end = to_the_end.map(|own| device.upload(&own, 0)).transpose()?;
@@ -107,10 +111,11 @@ impl ViewRun {
         let (pass, cursor, device_time) = (None, 0, Duration::ZERO);
         let longest = 2.0 * bounds.radius();
         let speed = context.speed(&plan.variant);
-        let smallest = prepared.volume().map_or(bounds.smallest_side(), |volume| volume.smallest_side());
         Ok(Self {
             slice_length: SliceLength::new(context.device.info(), longest / f64::from(plan.step), speed),
             quick: quick(speed, gathered.size),
+            is_followed: false,
+            places: Places::of_seed(scene.places()),
             pass_time: Duration::ZERO,
             shortest_slice: Duration::MAX,
             longest,
@@ -140,6 +145,7 @@ impl ViewRun {
     /// Starts over with another camera, since all samples are of the old one.
     pub fn restart(&mut self, context: &mut DeviceContext, scene: &Scene) -> Result<()> {
         self.scene = scene.clone();
+        self.places = Places::of_seed(scene.places());
         self.view = device_view(scene, &*self.prepared, &self.bounds);
         context.device.write(&mut self.parameters, 0, &self.prepared.parameters(scene.camera()))?;
         if let (Some(buffer), Some(own)) = (&mut self.to_the_end, self.prepared.parameters_to_the_end(scene.camera())) {
@@ -163,7 +169,7 @@ impl ViewRun {
         self.pass.is_none()
     }
 
-    /// True if a picture of the control is not worth showing.
+    /// True if a preview is not worth showing.
     pub fn is_quick(&self) -> bool {
         self.quick
     }
@@ -173,19 +179,20 @@ impl ViewRun {
         self.plan.step >= 2.0 * self.least_step
     }
 
-    /// Starts over with half the step, since the samples have the error of the longer one. The main passes of the longer step would make a good
-    /// control but for their number. A fresh control costs at most an eighth of a pass.
+    /// Starts over with half the step, since the samples have the error of the longer one.
     pub fn halve_step(&mut self, context: &DeviceContext) -> Result<()> {
         self.plan.step *= 0.5;
-        self.gathered.moving = None;
-        self.gathered.will_change();
-        self.slice_length = SliceLength::new(context.device.info(), self.longest / f64::from(self.plan.step), None);
-        for (layer, step) in self.gathered.layers.iter_mut().zip([2.0 * self.plan.step, self.plan.step]) {
-            (layer.samples, layer.step) = (0, step);
-            layer.table = table(&context.device, self.volume.as_deref(), &self.scene, &*self.prepared, step)?;
+        let Self { plan, volume, scene, prepared, gathered, .. } = self;
+        gathered.moving = None;
+        gathered.will_change();
+        self.slice_length = SliceLength::new(context.device.info(), self.longest / f64::from(plan.step), None);
+        let mut table = |step| table(&context.device, volume.as_deref(), scene, &**prepared, step);
+        for (layer, step) in gathered.layers.iter_mut().zip([2.0 * plan.step, plan.step]) {
+            (layer.samples, layer.step, layer.table) = (0, step, table(step)?);
         }
+        gathered.probe.iter_mut().try_for_each(|probe| probe.set_step(plan.step, &mut table))?;
+        gathered.rounds.forget();
         (self.pass, self.cursor, self.undone) = (None, 0, None);
-        self.gathered.rounds.forget();
         Ok(())
     }
 
@@ -212,14 +219,14 @@ impl ViewRun {
         let rays = (self.gathered.size[0] * self.gathered.size[1]) as f64;
         let ray_ms = self.ray_ms.or_else(|| context.speed(&self.plan.variant).map(f64::recip));
         let known = ray_ms.map(|ray_ms| motion.least(rays, ray_ms, self.plan.stepless));
-        let (lowered, step_loss) = known.unwrap_or_default();
+        let (lowered, losses) = known.unwrap_or_default();
         let step = self.plan.step;
         self.gathered.will_change();
         let before = self.gathered.moving.take();
         if !lowered.is_none() {
             let step_now = lowered.step * step;
             let table = table(&context.device, self.volume.as_deref(), &self.scene, &*self.prepared, step_now)?;
-            self.gathered.moving = Some(Moving::new(context, &self.scene, table, step, lowered, step_loss, before)?);
+            self.gathered.moving = Some(Moving::new(context, &self.scene, table, step, lowered, losses, before)?);
         }
         Ok(())
     }
@@ -237,6 +244,7 @@ fn device_view(scene: &Scene, prepared: &dyn PreparedView, bounds: &Bounds) -> D
     view.seed = [scene.seed() as u32, (scene.seed() >> 32) as u32];
     view.flat_squared = prepared.volume().map_or(0.0, |volume| flat_squared(volume));
     scene.clip().apply(bounds, &mut view);
+    Places::of_seed(scene.places()).apply(&mut view);
     prepared.set_shared(scene.camera(), &mut view);
     view
 }

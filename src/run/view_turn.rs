@@ -33,7 +33,9 @@ impl Live {
             return Ok(Turn::Again);
         }
         let slice = if self.is_moving() { MOVING_SLICE } else { SLICE };
+        let is_followed = self.job.is_followed();
         let Some(view) = &mut self.view else { return Ok(Turn::Over) };
+        view.is_followed = is_followed || matches!(self.stage, Stage::Looks);
         match view.slice(context, slice)? {
             None => Ok(Turn::Again),
             Some(Pass::Moving) => {
@@ -42,8 +44,11 @@ impl Live {
                 self.shown = Shown::Waits;
                 Ok(Turn::Again)
             }
-            Some(pass) if matches!(self.stage, Stage::Looks) => self.after_look(context, pass),
-            Some(pass) => self.after_pass(context, pass),
+            Some(Pass::Preview) => self.frame_if_due(context, Pass::Preview),
+            // The picture's error is about to be known.
+            Some(_) if view.owes_probe() => Ok(Turn::Again),
+            Some(_) if matches!(self.stage, Stage::Looks) => self.after_look(context),
+            Some(_) => self.after_pass(context),
         }
     }
 
@@ -54,20 +59,15 @@ impl Live {
     }
 
     /// Makes one picture of a field that is still filling; then the field goes on.
-    fn after_look(&mut self, context: &mut DeviceContext, pass: Pass) -> Result<Turn> {
-        if pass == Pass::Main {
-            self.compare_with_half(context)?;
-            self.leave_snapshot(context, None)?;
-            self.stage = Stage::Fills;
-        }
+    fn after_look(&mut self, context: &mut DeviceContext) -> Result<Turn> {
+        self.compare_with_half(context)?;
+        self.leave_snapshot(context, None)?;
+        self.stage = Stage::Fills;
         Ok(Turn::Again)
     }
 
-    fn after_pass(&mut self, context: &mut DeviceContext, pass: Pass) -> Result<Turn> {
+    fn after_pass(&mut self, context: &mut DeviceContext) -> Result<Turn> {
         let Some(view) = &mut self.view else { return Ok(Turn::Over) };
-        if pass != Pass::Main {
-            return self.frame_if_due(context, pass);
-        }
         if view.samples() == 1 {
             self.compare_with_half(context)?;
             self.learn_losses(context)?;
@@ -75,7 +75,7 @@ impl Live {
         let Some(view) = &mut self.view else { return Ok(Turn::Over) };
         view.gathered.field_error = self.field.as_ref().and_then(|f| f.error);
         match next(view, self.started, context)? {
-            Next::GoOn => self.frame_if_due(context, pass),
+            Next::GoOn => self.frame_if_due(context, Pass::Main),
             Next::Refine => view.halve_step(context).map(|()| Turn::Again),
             Next::Stop(reason) => {
                 if reason == "floor" {

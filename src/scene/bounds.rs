@@ -80,7 +80,7 @@ impl Bounds {
         let across = back.cross(right);
         let tangent = (0.5 * fov_y_deg.to_radians()).tan();
         let needs = |c: &DVec3| c.dot(right).abs().max(c.dot(across).abs()) / tangent + c.dot(back);
-        1.04 * self.corners().iter().map(needs).fold(0.0, f64::max).max(1e-3)
+        1.04 * self.corners().iter().map(needs).fold(f64::MIN_POSITIVE, f64::max)
     }
 }
 

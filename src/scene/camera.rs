@@ -103,7 +103,9 @@ impl Camera {
         }
         let eye = matrix.w_axis.truncate();
         let (right, forward) = (rotation.x_axis.normalize(), -rotation.z_axis.normalize());
-        let target = eye + forward * eye.length().max(1e-3);
+        // At the origin any distance does.
+        let reach = if eye == DVec3::ZERO { 1.0 } else { eye.length() };
+        let target = eye + forward * reach;
         Ok(Self { eye, target, right, up: right.cross(forward), forward, fov_y_deg, perspective })
     }
 
@@ -177,7 +179,7 @@ fn isotropic_squared(bounds: &Bounds) -> f32 {
 pub(crate) fn flat_squared(volume: &Volume) -> f32 {
     let [low, high] = volume.range();
     let voxel = volume.smallest_side();
-    (3e-5 * (high - low) / volume.slope().abs() / voxel).powi(2).max(1e-24) as f32
+    (3e-5 * (high - low) / volume.slope().abs() / voxel).powi(2) as f32
 }
 
 #[cfg(test)]

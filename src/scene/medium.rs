@@ -86,7 +86,7 @@ impl MediumRequest {
     /// [`Error::Invalid`] naming the field under `at`.
     pub fn check(&self, at: &str) -> Result<()> {
         if let Some(sigma) = self.sigma_t_per_unit {
-            sigma.check(&format!("{at}/sigma_t_per_unit"), 0.0, 1e9)?;
+            sigma.check(&format!("{at}/sigma_t_per_unit"), 0.0, 1e18)?;
             let (sigma, emission) = (sigma.rgb(), self.emission.rgb());
             if (0..3).any(|i| sigma[i] == 0.0 && emission[i] > 0.0) {
                 let detail = "light is emitted where nothing collides, and emission is found at collisions";

@@ -46,7 +46,7 @@ pub struct Label {
     #[schemars(inner(range(min = 0, max = 1)))]
     pub color: Option<[f64; 3]>,
     /// Extinction per world unit.
-    #[schemars(range(min = 0, max = 1e6))]
+    #[schemars(range(min = 0, max = 1e18))]
     pub opacity_per_unit: f64,
 }
 
@@ -60,6 +60,6 @@ pub struct ControlPoint {
     #[schemars(inner(range(min = 0, max = 1)))]
     pub color: [f64; 3],
     /// Extinction per world unit (per mm for a scan).
-    #[schemars(range(min = 0, max = 1e6))]
+    #[schemars(range(min = 0, max = 1e18))]
     pub opacity_per_unit: f64,
 }

@@ -59,7 +59,8 @@ impl WindowRequest {
 impl Window {
     /// A window from `low` to `high`. If `high` is not above `low`, the window ends a little above `low`.
     pub fn of(low: f64, high: f64) -> Self {
-        let least = (low.abs() * 1e-3).max(1e-3);
+        // All values are the same then.
+        let least = if low == 0.0 { 1.0 } else { low.abs() * 1e-3 };
         Self { low, high: if high > low { high } else { low + least } }
     }
 

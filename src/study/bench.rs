@@ -9,7 +9,7 @@ use crate::asset::Assets;
 use crate::config::{DeviceArgs, Limits};
 use crate::device::DeviceInfo;
 use crate::error::Result;
-use crate::film::{Film, SURE};
+use crate::film::Film;
 use crate::job::Job;
 use crate::plan::Plan;
 use crate::service::Service;
@@ -161,8 +161,8 @@ impl Bench {
             wall_ms: number("/timings/elapsed_ms"),
             samples: u64::from(film.main.count),
             bytes: film.bytes() as u64 + job.field().map_or(0, |f| f.bytes()),
-            stated_error: Some(film.error().total),
-            noise_is_random: !film.known_noise(SURE).1,
+            stated_error: film.error().total,
+            noise_is_random: !film.is_well_spread(),
             reply,
         })
     }

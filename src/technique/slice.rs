@@ -15,7 +15,7 @@
 //! | `plane.axis` | world axis | `x`, `y`, `z` | |
 //! | `plane.position` | world units | | 0 |
 //! | `plane.fraction` | of the volume's extent along the axis | 0–1 | |
-//! | `thickness` | world units | 0–10⁹ | 0: the plane itself |
+//! | `thickness` | world units | 0–10¹³ | 0: the plane itself |
 //! | `mode` | | `maximum`, `minimum`, `mean`: of the slab | `mean` |
 //! | `interpolation` | | `nearest`, `trilinear`, `b_spline`, `catmull_rom` | `trilinear` |
 //! | `window` | values | `level` and `width`, or `low` and `high` | the volume's range |
@@ -85,16 +85,16 @@ device_struct! {
 #[serde(deny_unknown_fields)]
 pub struct Plane {
     /// A point of the plane, world units. Default: the volume's centre.
-    #[schemars(inner(range(min = -1e9, max = 1e9)))]
+    #[schemars(inner(range(min = -1e13, max = 1e13)))]
     point: Option<[f64; 3]>,
     /// Across the plane, of any length but 0. Default: towards the camera.
-    #[schemars(inner(range(min = -1e9, max = 1e9)))]
+    #[schemars(inner(range(min = -1e13, max = 1e13)))]
     normal: Option<[f64; 3]>,
     /// The world axis that the plane is across, instead of `point` and `normal`.
     #[schemars(extend("enum" = ["x", "y", "z"]))]
     axis: Option<String>,
     /// Where on the axis, world units; 0 is the volume's centre.
-    #[schemars(range(min = -1e9, max = 1e9))]
+    #[schemars(range(min = -1e13, max = 1e13))]
     position: Option<f64>,
     /// Where on the axis, from the one end of the volume's extent to the other.
     #[schemars(range(min = 0, max = 1))]
@@ -123,7 +123,7 @@ pub struct Parameters {
     plane: Plane,
     /// Thickness of the slab around the plane, world units.
     #[serde(default)]
-    #[schemars(range(min = 0, max = 1e9))]
+    #[schemars(range(min = 0, max = 1e13))]
     thickness: f64,
     /// What is shown of the slab.
     #[serde(default)]

@@ -42,6 +42,8 @@ pub struct ViewPlan {
     pub state_words: usize,
     /// True if the step has no effect on the picture.
     pub stepless: bool,
+    /// True if the method has an error besides noise that is not measured.
+    pub biased: bool,
     /// The opacity at which a ray ends. The light behind is part of the error.
     pub opacity_threshold: f64,
     /// The reasons for the plan, in words.

@@ -2,7 +2,7 @@
 
 use crate::device::enums::DeviceEnum;
 use crate::device_enum;
-use crate::film::{Apart, Sums};
+use crate::film::Sums;
 
 device_enum! {
     /// Numbers that a work-item leaves of two rows of the film.
@@ -34,18 +34,6 @@ device_enum! {
     }
 }
 
-device_enum! {
-    /// Numbers that a work-item leaves of a row of the control: the first of as many numbers as [`FilmSum`] has.
-    pub enum ControlSum: "CONTROL" {
-        /// The greatest difference to the film.
-        DifferenceScale,
-        /// Squared differences, relative to its square.
-        Difference,
-        /// Variances of single samples.
-        Variance,
-    }
-}
-
 /// The numbers of a work-item.
 pub const SUMS: usize = FilmSum::LENGTH;
 
@@ -66,16 +54,4 @@ pub fn sums_of_block(numbers: &[f32; SUMS]) -> Sums {
         weighted: of(FilmSum::Weighted),
         ..Sums::default()
     }
-}
-
-/// The sums of the rows of the control.
-pub fn sums_of_control(rows: &[[f32; SUMS]], pixels: usize) -> Apart {
-    let [mut squared, mut variance] = [0.0; 2];
-    for row in rows {
-        let of = |sum: ControlSum| f64::from(row[sum as usize]);
-        let scale = of(ControlSum::DifferenceScale);
-        squared += of(ControlSum::Difference) * scale * scale;
-        variance += of(ControlSum::Variance);
-    }
-    Apart { squared, variance, pixels }
 }

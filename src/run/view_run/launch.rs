@@ -6,6 +6,7 @@ use super::ViewRun;
 use crate::device::Device;
 use crate::error::Result;
 use crate::run::gathered::Pass;
+use crate::run::probe::Probe;
 
 /// The greatest number of packets of a beam. Rays of so many times fewer steps than a work-item may take are not bounded.
 const PACKETS: u32 = 4;
@@ -40,13 +41,14 @@ impl ViewRun {
             self.resume.before(device, items)?;
         }
         let layer = self.gathered.layer(pass);
-        let own = self.to_the_end.as_ref().filter(|_| pass == Pass::Control).unwrap_or(&self.parameters);
+        let goes_on = pass == Pass::Probe && self.gathered.probe.as_ref().is_some_and(Probe::goes_to_the_end);
+        let own = self.to_the_end.as_ref().filter(|_| goes_on).unwrap_or(&self.parameters);
         let mut arguments = vec![
             ("view", &self.view_buffer),
             ("params", own),
             ("table", &*layer.table),
             ("film", &layer.buffer),
-            ("counts", &self.gathered.counts),
+            ("counts", self.gathered.counts(pass)),
         ];
         if let Some(volume) = &self.volume {
             arguments.push(("voxels", &volume.voxels));

@@ -7,7 +7,7 @@ use crate::device::structs::View as DeviceView;
 use crate::error::Result;
 use crate::run::context::DeviceContext;
 use crate::run::gathered::Pass;
-use crate::run::sample_offsets::sample_offset;
+use crate::run::layer::Layer;
 
 /// The shortest slice that tells the speed of a kernel. Shorter slices each wait for their longest rays.
 const TELLING_SLICE: Duration = Duration::from_millis(10);
@@ -48,10 +48,13 @@ impl ViewRun {
                 context.measured(&self.plan.variant, width * height, self.pass_time);
             }
         }
-        self.gathered.layer_mut(pass).passed();
         (self.pass, self.cursor) = (None, 0);
-        // Adaptive samples have no halves, since they are placed by the error.
-        if pass == Pass::Main && !self.random.is_some_and(|r| r.adaptive) {
+        if pass == Pass::Probe {
+            self.gathered.probe_passed(context)?;
+            return Ok(Some(pass));
+        }
+        self.gathered.layer_mut(pass).passed();
+        if pass == Pass::Main {
             self.gathered.keep_round(context, self.device_time)?;
         }
         Ok(Some(pass))
@@ -60,27 +63,52 @@ impl ViewRun {
     /// Chooses the next pass.
     fn begin(&mut self, context: &DeviceContext) -> Result<Pass> {
         self.gathered.will_change();
-        let pass = self.gathered.next_pass();
+        let samples = self.samples();
+        let pass = self.gathered.next_pass(self.is_followed && !self.quick, self.wants_error());
         let adaptive = pass == Pass::Main && self.random.is_some_and(|r| r.adaptive);
         self.gathered.layer_mut(pass).choose_tiles(context, adaptive)?;
-        if pass == Pass::Main && self.samples() == 0 {
+        if pass == Pass::Main && samples == 0 {
             // The counts are of the picture, not of its preview.
             context.device.write(&mut self.gathered.counts, 0, &[0; 32])?;
         }
-        let layer = self.gathered.layer(pass);
-        let view = DeviceView {
-            width: layer.width as i32,
-            height: layer.height as i32,
-            stride: layer.picture_stride as i32,
-            sample: layer.samples as i32,
-            stream: layer.stream,
-            offset: sample_offset(layer.samples).to_array(),
-            step: layer.step,
-            ..self.view
-        };
-        self.pass_view = view;
+        if let (Pass::Probe, Some(probe)) = (pass, &mut self.gathered.probe) {
+            probe.begin(samples);
+        }
+        self.pass_view = self.view_of(self.gathered.layer(pass));
         self.pass = Some(pass);
         (self.pass_time, self.shortest_slice) = (Duration::ZERO, Duration::MAX);
         Ok(pass)
+    }
+
+    /// The device's view for a pass.
+    fn view_of(&self, layer: &Layer) -> DeviceView {
+        let [width, height] = layer.film_size().map(|n| n as i32);
+        let held = if layer.batch.is_some() { 0 } else { layer.samples as i32 };
+        DeviceView {
+            width,
+            height,
+            stride: layer.picture_stride as i32,
+            sample: layer.samples as i32,
+            held,
+            batch: layer.batch.map_or([0; 2], |b| [b.across as i32, b.down as i32]),
+            own_places: layer.batch.is_some().into(),
+            cluster: layer.batch.map_or(0, |b| b.cluster as i32),
+            stream: layer.stream,
+            offset: self.places.at(layer.samples).to_array(),
+            step: layer.step,
+            ..self.view
+        }
+    }
+
+    /// True if the error is asked for before there are many samples: of a picture that somebody watches, or that may be the last one.
+    fn wants_error(&self) -> bool {
+        let budget = self.scene.budget();
+        let may_stop = budget.max_error.is_some() || budget.time_ms.is_some() || budget.samples <= self.samples();
+        self.is_followed || may_stop
+    }
+
+    /// True if the error of the picture is about to be known better.
+    pub fn owes_probe(&self) -> bool {
+        self.gathered.owes_probe(self.wants_error())
     }
 }

@@ -33,6 +33,8 @@ pub struct Judged {
 pub fn judge(bench: &Bench, truth: &Value, picture: &[f64], most_ms: f64) -> Result<Option<Judged>> {
     let mut samples = 64;
     let mut spent = 0.0;
+    // What twice the step makes is at least what the step still costs the truth.
+    let by_step = step_error(bench, truth)?;
     loop {
         let mut means = Vec::new();
         for (seed, side) in [(900_001, BLOCKS[0]), (900_002, BLOCKS[1])] {
@@ -43,10 +45,13 @@ pub fn judge(bench: &Bench, truth: &Value, picture: &[f64], most_ms: f64) -> Res
         }
         let values: Vec<f64> = means[0].iter().zip(&means[1]).map(|(a, b)| 0.5 * (a + b)).collect();
         // Each of the two is wrong by half of their difference, as their mean is.
-        let known_to = measure(&means[..1], &values)?.rmse;
+        let known_to = measure(&means[..1], &values)?.rmse.hypot(by_step);
         let apart = measure(std::slice::from_ref(&picture.to_vec()), &values)?.rmse;
         let error = (apart.powi(2) - known_to.powi(2)).max(0.0).sqrt();
         let judged = Judged { error, known_to };
+        if by_step > TOO_MUCH * apart {
+            return Ok(None);
+        }
         if known_to <= ENOUGH * apart || apart < NOTHING {
             return Ok(Some(judged));
         }
@@ -55,6 +60,19 @@ pub fn judge(bench: &Bench, truth: &Value, picture: &[f64], most_ms: f64) -> Res
         }
         samples *= 4;
     }
+}
+
+/// The difference that twice the truth's step makes, on the same places and random numbers, relative to the mean luminance; 0 without a step.
+fn step_error(bench: &Bench, truth: &Value) -> Result<f64> {
+    let name = truth["technique"].as_str().unwrap_or_default();
+    let Some(step) = truth[name]["step_voxels"].as_f64() else { return Ok(0.0) };
+    let run = |step: f64| -> Result<Vec<f64>> {
+        let mut request = request(truth, 1, 16, 900_003);
+        request[name]["step_voxels"] = json!(step);
+        Ok(bench.run(&request, Reads::Luminance)?.values)
+    };
+    let (fine, twice) = (run(step)?, run(2.0 * step)?);
+    Ok(measure(&[twice], &fine)?.rmse)
 }
 
 /// The truth's request with blocks of pixels in place of pixels, and about as many samples in all of them.

@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 use crate::technique::draw::{Draw, set};
 
 /// The step of a truth, in voxels.
-const FINE: f64 = 0.1;
+const FINE: f64 = 0.05;
 
 /// A transfer function: a preset, a thin shell, or a few control points.
 fn transfer_function(draw: &mut Draw<'_>) -> Value {

@@ -96,6 +96,7 @@ impl Parameters {
             step: (self.step_voxels * volume.smallest_side()) as f32,
             state_words: STATE_WORDS,
             stepless: false,
+            biased: false,
             opacity_threshold: self.threshold(),
             reasons,
         })

@@ -77,11 +77,11 @@ pub fn extent(regions: &[Region], volume: &Volume) -> ([f64; 2], f64) {
     let high = regions.iter().map(|r| r.value[1]).fold(f64::NEG_INFINITY, f64::max);
     let steep = regions.iter().map(|r| r.gradient[1]).fold(0.0, f64::max);
     // The margin makes the outermost entries empty, which stand for all values beyond.
-    let margin = (high - low).max(1e-12) / (SIDE - 4) as f64;
+    let margin = (high - low).max(f64::MIN_POSITIVE) / (SIDE - 4) as f64;
     let voxel = volume.smallest_side();
     let [least, most] = volume.range();
     // No gradient is steeper than the whole range from one voxel to the next, along all three axes.
-    let possible = 1.75 * (most - least).max(1e-12) / voxel;
+    let possible = 1.75 * (most - least).max(f64::MIN_POSITIVE) / voxel;
     ([low - 2.0 * margin, high + 2.0 * margin], steep.min(possible) * (SIDE as f64 / (SIDE - 2) as f64))
 }
 

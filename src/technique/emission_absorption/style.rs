@@ -138,7 +138,9 @@ impl Styles<'_> {
         let narrow = |c: [f64; 3]| c.map(|v| v as f32);
         if let Some(g) = self.gradient_opacity {
             let [low, high] = volume.range();
-            let reference = g.reference.unwrap_or((high - low).max(1e-12) / (10.0 * voxel));
+            // A constant has no gradient, whatever the reference.
+            let range = if high > low { high - low } else { 1.0 };
+            let reference = g.reference.unwrap_or(range / (10.0 * voxel));
             device.gradient_gain = (volume.slope().abs() / reference) as f32;
         }
         if let Some(s) = self.silhouette {

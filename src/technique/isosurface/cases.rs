@@ -23,7 +23,7 @@ pub(super) fn cases() -> Cases {
 }
 
 /// The step of a truth, in voxels.
-const FINE: f64 = 0.1;
+const FINE: f64 = 0.05;
 
 /// Parameters at random.
 fn draw(draw: &mut Draw<'_>) -> Value {

@@ -124,6 +124,7 @@ impl View for Parameters {
             step: (self.step_voxels * smallest) as f32,
             state_words: STATE_WORDS,
             stepless: false,
+            biased: false,
             opacity_threshold: if self.layered(&surfaces) { OPACITY_THRESHOLD } else { 1.0 },
             reasons,
         };

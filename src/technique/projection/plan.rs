@@ -154,6 +154,7 @@ impl Parameters {
             step: (if self.walked() { 1.0 } else { self.step_voxels } * smallest) as f32,
             state_words: STATE_WORDS,
             stepless: self.walked(),
+            biased: false,
             opacity_threshold: 1.0,
             reasons,
         })

@@ -75,7 +75,7 @@ fn the_example_and_every_default_show_something() {
     let house = House::shared();
     let lit = |request: &Value| {
         let (_, error) = house.film(request);
-        assert!(error.total.is_finite());
+        assert!(error.total.unwrap().is_finite());
         let bytes = house.picture(request);
         let bright = bytes.iter().filter(|b| **b > 100).count() as f64 / bytes.len() as f64;
         let dark = bytes.iter().filter(|b| **b < 90).count() as f64 / bytes.len() as f64;

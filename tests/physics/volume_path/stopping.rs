@@ -49,7 +49,7 @@ fn the_stated_error_is_the_real_one() {
     for adaptive in [false, true] {
         let request = scene("volume_path", &smoke(), &camera(), &own(&json!({"adaptive": adaptive})), 48, 64);
         let film = film(House::shared(), &request);
-        let (real, stated) = (film.difference(&truth).unwrap(), film.error().total);
+        let (real, stated) = (film.difference(&truth).unwrap(), film.error().total.unwrap());
         println!("adaptive {adaptive}: {real:.4} real, {stated:.4} stated");
         assert!((0.8..1.25).contains(&(stated / real)), "adaptive {adaptive}: {real} real, {stated} stated");
     }
@@ -66,7 +66,7 @@ fn adaptive_samples_go_where_the_noise_is_with_a_bias_below_it() {
     let tiles = placed.main.tiles.as_ref().unwrap();
     assert_eq!(tiles.counts.iter().sum::<u32>(), 16 * 96, "{:?}", tiles.counts);
     assert!(tiles.counts.iter().max() > tiles.counts.iter().min(), "{:?}", tiles.counts);
-    let (before, after) = (even.error().total, placed.error().total);
+    let (before, after) = (even.error().total.unwrap(), placed.error().total.unwrap());
     println!("error {before:.4} evenly, {after:.4} placed");
     assert!(after < 0.95 * before, "{after} is no less than {before}");
     // The bias over twenty seeds is within their noise, and less than 0.2 % of the mean.

@@ -105,7 +105,7 @@ async fn the_resource_tells_plan_samples_error_timings_and_trace() {
     assert_eq!(resource["plan"]["budget"]["samples"], 9);
     let reasons = resource["plan"]["reasons"].as_array().unwrap();
     assert!(reasons.iter().any(|r| r.as_str().unwrap().contains("ramp")), "the default is named: {reasons:?}");
-    // The parts make up the total: the root of the sum of their squares.
+    // The total is a bound: no less than the root of the sum of the squares of its parts.
     let error = resource["error"].as_f64().unwrap();
     let parts = resource["error_parts"].as_object().unwrap();
     assert_eq!(parts["total"], resource["error"]);
@@ -113,7 +113,8 @@ async fn the_resource_tells_plan_samples_error_timings_and_trace() {
         assert!(parts[name].as_f64().is_some_and(|e| e >= 0.0), "{name} in {parts:?}");
     }
     let squares = parts.iter().filter(|(n, _)| *n != "total").filter_map(|(_, e)| e.as_f64()).map(|e| e * e);
-    assert!((squares.sum::<f64>().sqrt() - error).abs() < 1e-9 * error, "{parts:?}");
+    let together = squares.sum::<f64>().sqrt();
+    assert!(error >= together * (1.0 - 1e-9) && error < 3.0 * together, "{parts:?}");
     let timings = &resource["timings"];
     for name in ["queued_ms", "first_frame_ms", "device_ms", "elapsed_ms"] {
         assert!(timings[name].as_f64().is_some_and(|t| t >= 0.0), "{name} in {timings}");

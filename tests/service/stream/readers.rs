@@ -30,7 +30,10 @@ async fn frames_have_their_headers_never_fall_and_end_with_the_final_one() {
     assert!(last.is_final() && !before.iter().any(Part::is_final), "only the last is final");
     for part in &parts {
         assert_eq!(part.headers["content-type"], "image/png");
-        assert!(part.number("x-cloudchamber-error") >= 0.0);
+        // Of a preview with a longer step no error is known.
+        let is_known = part.headers["x-cloudchamber-error"] != "unknown";
+        assert!(!is_known || part.number("x-cloudchamber-error") >= 0.0);
+        assert!(is_known || !part.is_final());
         assert_eq!(pixels(&part.body).0, 384, "every frame has the full size");
         assert_eq!(description(&part.body)["samples"], part.number("x-cloudchamber-samples") as u64);
     }
