@@ -101,7 +101,7 @@ static inline void whole_steps(constant const View *view, constant const Emissio
     Real position[STRIDE], low = (Real)(INFINITY), high = (Real)(-INFINITY);
     whole_steps_raw(view, voxels, p, k, end, position);
     for (int i = 0; i < end - k; i++) {
-        position[i] = table_position(params, position[i], INNER_UNIT);
+        position[i] = table_position(params, table, position[i], INNER_UNIT);
         low = LESSER(position[i], low), high = GREATER(position[i], high);
     }
     Span s = span_of(table, least_lane(low), greatest_lane(high));

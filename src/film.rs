@@ -11,7 +11,7 @@ mod sums;
 
 use std::sync::Arc;
 
-pub use estimate::ErrorEstimate;
+pub use estimate::{ErrorEstimate, Source};
 pub use lowered::Lowered;
 use picture::Background;
 pub use probed::{Estimate, ProbePixel, ProbedNoise, ProbedStep, StepPixel};
@@ -135,7 +135,7 @@ pub struct Film {
     pub biased: bool,
     /// The opacity at which rays end.
     pub opacity_threshold: f64,
-    /// True if the probe's rays go to their end at longer steps, so that its difference has the loss of others' early end.
+    /// True if the probe's rays go to their end at other steps, so that its difference has the loss of others' early end.
     pub to_the_end: bool,
     /// The relative change of the picture since the field had half its histories.
     pub field_error: Option<f64>,
@@ -145,8 +145,21 @@ pub struct Film {
     pub lowered: Lowered,
     /// The losses of a picture that was reduced to be in time, relative, as earlier pictures showed them.
     pub reduced: Option<Reduced>,
+    /// What a planner knows of a picture made as it planned.
+    pub planned: Option<Planned>,
     /// The rounds of a pilot.
     pub(crate) rounds: Vec<Arc<Round>>,
+}
+
+/// What a planner has measured of a picture that is made as it planned, relative.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Planned {
+    /// An upper bound of its error after the planned samples, which 95 of 100 pictures keep; `None` if the picture is not the planned one.
+    pub bound: Option<f64>,
+    /// The planned samples per pixel.
+    pub samples: u32,
+    /// The error that it has against the scene as it was asked for, however many samples it takes.
+    pub bias: f64,
 }
 
 /// The losses of a picture that was reduced to be in time, relative.

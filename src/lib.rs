@@ -30,6 +30,7 @@
 //! | [`asset`] | stored things, by the hash of their content: volumes |
 //! | [`volume`] | grids: readers, built-ins |
 //! | [`power_law`] | lines on logarithmic axes |
+//! | [`split_mix`] | random numbers of the host |
 //! | [`error`] | one error enum; the one place that chooses a status code |
 //!
 //! Kernels: `kernels/<technique>.cl` and `kernels/shared/`. The viewer: `static/`. Tests: `tests/physics/<technique>.rs` in this process,
@@ -52,6 +53,7 @@ pub mod request;
 pub mod run;
 pub mod scene;
 pub mod service;
+pub mod split_mix;
 pub mod study;
 pub mod technique;
 pub mod volume;

@@ -83,8 +83,9 @@ impl Service {
     /// Those of the planner, of [`Engine::reserve`] and of [`Service::scene`].
     pub async fn prepare(&self, request: Value) -> Result<Prepared> {
         let (request, planned) = self.planner().resolve(request).await?;
-        self.load(request, planned, |service, request| {
-            service.scene(request).map(|scene| Task::Picture(Box::new(scene)))
+        let (words, known) = planned.unzip();
+        self.load(request, words, move |service, request| {
+            service.scene(request).map(|scene| Task::Picture(Box::new(scene.as_planned(known))))
         })
         .await
     }

@@ -8,7 +8,7 @@ const TYPES = { uint8: Uint8Array, int16: Int16Array, uint16: Uint16Array, float
 /** The subject of the editor (see Volumes.subject) for the field of a render that has begun. */
 export async function fieldSubject(renderId) {
   const response = await call(`v1/renders/${renderId}/field`, { accept: 'application/octet-stream' });
-  return { ...histogramOf(await response.arrayBuffer()), format: 'field' };
+  return { ...histogramOf(await response.arrayBuffer()), kind: 'density' };
 }
 
 /** Range, counts and mean side of a raw little-endian NRRD, the only kind that the server writes. */

@@ -110,6 +110,7 @@ async function volumeChosen() {
     const shown = volumes.select.value;
     const subject = await volumes.subject();
     if (shown !== volumes.select.value) return;
+    volumes.tell(subject.takenFor);
     showValues(subject.range);
     transfer.setVolume(subject);
   } catch (error) {

@@ -31,20 +31,26 @@ const BLUE_YELLOW = [
   [0, '#2040ff', 0], [0.12, '#2040ff', 0], [0.16, '#2040ff', 0.2], [0.44, '#2040ff', 0.2], [0.5, '#ffe020', 8], [1, '#ffe020', 8],
 ];
 
-const isHounsfield = ([low, high]) => low <= -500 && high >= 600;
+/** Amounts below 0 are blue and those above red. */
+const SIGNED = [
+  [0, '#2166ac', 1], [0.25, '#67a9cf', 0.4], [0.45, '#d1e5f0', 0], [0.55, '#fddbc7', 0], [0.75, '#ef8a62', 0.4], [1, '#b2182b', 1],
+];
 
-/** The preset that the server takes where a request names none. */
-export function suitingPreset(format, range) {
-  if (format === 'builtin' || format === 'field') return 'ramp';
-  return isHounsfield(range) ? 'ct_bone' : 'mri_head';
+/** The preset that the server takes for each kind of values where a request names none. */
+const SUITING = { density: 'ramp', hounsfield: 'ct_bone', labels: 'labels', signed_map: 'signed', intensity: 'mri_head' };
+
+export function suitingPreset(kind) {
+  return SUITING[kind] ?? 'ramp';
 }
 
 /**
  * @param {string} name
- * @param {{range: [number, number], meanSide: number}} volume
+ * @param {{range: [number, number], window?: [number, number], kind?: string, meanSide: number}} volume
  * @param {{rotation?: number, exponent?: number}} own what the preset takes besides
  */
-export function presetPoints(name, { range: [low, high], meanSide }, { rotation = 0, exponent = 2 } = {}) {
+export function presetPoints(name, { range, window = range, kind, meanSide }, { rotation = 0, exponent = 2 } = {}) {
+  const most = Math.max(...window.map(Math.abs));
+  const [low, high] = name === 'signed' ? [-most, most] : window;
   const full = OPTICAL_DEPTH / meanSide;
   const point = (value, color, opacity) => ({
     value: Number(value.toPrecision(4)), color, opacity_per_unit: Number((opacity * full).toPrecision(4)),
@@ -54,10 +60,10 @@ export function presetPoints(name, { range: [low, high], meanSide }, { rotation 
       .map((v) => point(v * (high > 0 ? high : 1), colorOf(hue(v + rotation)), v ** exponent));
   }
   const absolute = { ct_bone: CT_BONE_HOUNSFIELD, bone_flesh: BONE_FLESH_HOUNSFIELD }[name];
-  if (absolute && isHounsfield([low, high])) {
+  if (absolute && kind === 'hounsfield') {
     return absolute.map(([value, color, opacity]) => point(value, colorOf(color), opacity));
   }
-  const shape = { mri_head: MRI_HEAD, ct_bone: CT_BONE, bone_flesh: BONE_FLESH, blue_yellow: BLUE_YELLOW }[name] ?? RAMP;
+  const shape = { mri_head: MRI_HEAD, ct_bone: CT_BONE, bone_flesh: BONE_FLESH, blue_yellow: BLUE_YELLOW, signed: SIGNED }[name] ?? RAMP;
   return shape.map(([place, color, opacity]) => point(low + (high - low || 1) * place, colorOf(color), opacity));
 }
 

@@ -15,7 +15,7 @@ const GAP = 1e-4; // between the values of two points, of the axis' length
 export class TransferEditor {
   points = [];
   selected = 0;
-  volume = { range: [0, 1], counts: null, meanSide: 2, format: 'field' };
+  volume = { range: [0, 1], counts: null, meanSide: 2, kind: 'density' };
   #drag = false;
   #extras = null;
 
@@ -90,7 +90,7 @@ export class TransferEditor {
 
   /** The preset in force, also where the server chooses. */
   get #name() {
-    return this.preset.value || suitingPreset(this.volume.format, this.volume.range);
+    return this.preset.value || suitingPreset(this.volume.kind);
   }
 
   #ownOfPreset() {
@@ -104,7 +104,7 @@ export class TransferEditor {
 
   #refill() {
     const automatic = this.preset.querySelector('option[value=""]');
-    if (automatic) automatic.textContent = `auto (${suitingPreset(this.volume.format, this.volume.range).replaceAll('_', ' ')})`;
+    if (automatic) automatic.textContent = `auto (${suitingPreset(this.volume.kind).replaceAll('_', ' ')})`;
     this.extras.replaceChildren(...(!this.custom && this.#name === 'hls' && this.#extras ? [this.#extras.element] : []));
     if (!this.custom) this.points = presetPoints(this.#name, this.volume, this.#ownOfPreset());
     this.selected = Math.min(this.selected, this.points.length - 1);

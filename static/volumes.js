@@ -91,14 +91,21 @@ export class Volumes {
   /** What the transfer function editor needs of the chosen volume; of a field, whose values are not known yet, a guess. */
   async subject() {
     const { current } = this;
-    if (!current) return { range: [0, 1], counts: null, meanSide: 1, format: 'field', guessed: true };
-    const { histogram, range, dims, spacing, format } = await json(`v1/volumes/${encodeURIComponent(current.id ?? current.builtin)}`);
+    if (!current) return { range: [0, 1], counts: null, meanSide: 1, kind: 'density', guessed: true };
+    const { histogram, range, dims, spacing, contents } = await json(`v1/volumes/${encodeURIComponent(current.id ?? current.builtin)}`);
     return {
       range: histogram ? [histogram.min, histogram.max] : range,
       counts: histogram?.counts ?? null,
       meanSide: dims.reduce((sum, count, axis) => sum + count * spacing[axis], 0) / dims.length,
-      format,
+      kind: contents?.kind,
+      window: contents?.window,
+      takenFor: contents && takenFor(contents),
     };
+  }
+
+  /** What became known of the volume that is shown. */
+  tell(words) {
+    if (words) document.getElementById('volume-facts').textContent += ` · ${words}`;
   }
 
   #choose() {
@@ -197,6 +204,20 @@ export class Volumes {
       this.send(event.dataTransfer.files);
     });
   }
+}
+
+const KINDS = {
+  density: 'a density', hounsfield: 'Hounsfield units', labels: 'labels', signed_map: 'a map with values below and above 0', intensity: 'intensities',
+};
+
+/** What the server takes a volume for, in words. */
+function takenFor({ kind, padding, beyond, window }) {
+  const said = [
+    `taken for ${KINDS[kind] ?? kind}`,
+    padding != null && `${brief(padding)} is no data`,
+    beyond && `a few values are beyond ${brief(window[0])} to ${brief(window[1])}`,
+  ];
+  return said.filter(Boolean).join(' · ');
 }
 
 function facts(volume) {

@@ -20,6 +20,11 @@
 
 #define JOIN_(a, b) a##b
 #define JOIN(a, b) JOIN_(a, b)
+#if defined(__clang__) && LANES > 1
+// More lanes than the processor's registers have are passed to functions in another way than in a program that is compiled for wider ones. No such
+// program is linked with this one.
+#pragma clang diagnostic ignored "-Wpsabi"
+#endif
 typedef JOIN(float, LANES_SUFFIX) Real;
 typedef JOIN(int, LANES_SUFFIX) Int;
 typedef JOIN(uint, LANES_SUFFIX) UInt;

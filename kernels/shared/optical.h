@@ -29,21 +29,48 @@ static inline Optical optical(Entry e) {
     return o;
 }
 
-// The position in the table of a raw value in units of `unit`: entry i is at i. It is NaN if the value is.
-static inline Real table_position(constant const EmissionAbsorption *params, Real raw, float unit) {
-    Real x = mad(raw, (Real)(params->table_scale * unit), (Real)(params->table_offset - 0.5f));
-    Real position = clamp(x, (Real)(0.0f), (Real)(TABLE_SIZE - 1));
-#if VOXEL == VOXEL_F32
-    position = select(position, raw, MASK(raw != raw));
-#endif
-    return position;
-}
-
 // Behind the table of a function that is smooth except for some kinks stand its pieces: their starts, the ends of their empty parts, and their
 // polynomials, a cubic for the opacity and a line for each colour (src/technique/emission_absorption/pieces.rs).
 typedef struct { float start[PIECES], empty[PIECES], opacity[4][PIECES], colour[3][2][PIECES]; } Pieces;
 
 #define PIECES_OF(table) ((global const Pieces *)((table) + 8 * TABLE_SIZE))
+
+// At the end of a table whose entries are denser at some values stand its knots: the places on an even table from which on entries have another
+// density, the widths up to the next, and the entries per place (src/scene/transfer_table.rs).
+typedef struct { float start[KNOTS], width[KNOTS], density[KNOTS]; } Knots;
+
+#if PREINTEGRATED
+#define KNOTS_OF(table) ((global const Knots *)((table) + 32 * TABLE_SIZE))
+#else
+#define KNOTS_OF(table) ((global const Knots *)(PIECES_OF(table) + 1))
+#endif
+
+// The position in the table of a place `x` on an even table.
+static inline Real warped(constant const EmissionAbsorption *params, global const uchar *table, Real x) {
+    global const Knots *knots = KNOTS_OF(table);
+    Real position = (Real)(0.0f);
+    for (int i = 0; i < params->knots; i++) {
+        Real within = clamp(x - knots->start[i], (Real)(0.0f), (Real)(knots->width[i]));
+        position = mad(within, (Real)(knots->density[i]), position);
+    }
+    return position;
+}
+
+// The place of a raw value in units of `unit` on an even table, whose entry i is at i.
+static inline Real even_position(constant const EmissionAbsorption *params, Real raw, float unit) {
+    Real x = mad(raw, (Real)(params->table_scale * unit), (Real)(params->table_offset - 0.5f));
+    return clamp(x, (Real)(0.0f), (Real)(TABLE_SIZE - 1));
+}
+
+// The position of a raw value in the table: entry i is at i. It is NaN if the value is.
+static inline Real table_position(constant const EmissionAbsorption *params, global const uchar *table, Real raw, float unit) {
+    Real position = even_position(params, raw, unit);
+    if (params->knots) position = warped(params, table, position);
+#if VOXEL == VOXEL_F32
+    position = select(position, raw, MASK(raw != raw));
+#endif
+    return position;
+}
 
 // The piece of a position; -1 if there are none.
 static inline int piece_at(global const Pieces *t, float position) {
@@ -127,7 +154,7 @@ static inline Optical optical_at(global const uchar *table, Span s, int form, Re
 
 // The same at a raw value in units of `unit`.
 static inline Optical classify(constant const EmissionAbsorption *params, global const uchar *table, Real raw, float unit) {
-    Real position = table_position(params, raw, unit);
+    Real position = table_position(params, table, raw, unit);
 #if VOXEL == VOXEL_F32
     Mask nan = MASK(position != position);
     Span s = span_of(table, least_lane(select(position, (Real)(INFINITY), nan)), greatest_lane(select(position, (Real)(-INFINITY), nan)));

@@ -33,6 +33,9 @@ pub struct Difference {
     pub p_value: f64,
     /// True if at least 99.75 % of the pixels are within the level.
     pub agree: bool,
+    /// True if both pictures have one seed. Places and random numbers that they share bring the same noise, which is not in their difference: z is too
+    /// small then, and a p-value near 1 says little.
+    pub correlated: bool,
     #[serde(skip)]
     z: Vec<f64>,
     #[serde(skip)]
@@ -63,11 +66,11 @@ fn least_of(p: f64, n: f64) -> f64 {
 }
 
 impl Film {
-    /// Compares this film with another one.
+    /// Compares this film with another one; `correlated` is true if both have one seed.
     ///
     /// # Errors
     /// [`Error::Conflict`] if the two are not pictures of one size with two samples or more.
-    pub fn compare(&self, other: &Film) -> Result<Difference> {
+    pub fn compare(&self, other: &Film, correlated: bool) -> Result<Difference> {
         for film in [self, other] {
             if film.main.stride != 1 || film.main.count < 2 {
                 return Err(Error::Conflict("of fewer than two samples a pixel no error is known".into()));
@@ -108,6 +111,7 @@ impl Film {
             mean_z_squared: squares / n,
             p_value: least_of(by_mean.min(chi_squared_tail(squares, n)), 2.0),
             agree: beyond as f64 <= 0.0025 * n,
+            correlated,
             z,
             size: self.size,
         })
@@ -170,14 +174,14 @@ mod tests {
 
     #[test]
     fn noise_agrees_and_a_shift_does_not() -> Result<()> {
-        let same = film(|i| 1.0 + noise(i, 1)).compare(&film(|i| 1.0 + noise(i, 2)))?;
+        let same = film(|i| 1.0 + noise(i, 1)).compare(&film(|i| 1.0 + noise(i, 2)), false)?;
         assert!(same.agree && same.beyond == 0 && same.p_value > 0.01, "{}", same.p_value);
         assert!((same.mean_z_squared - 1.0).abs() < 0.1, "{}", same.mean_z_squared);
         // A shift of a twelfth of a pixel's error is seen in the mean alone.
-        let shifted = film(|i| 1.008 + noise(i, 1)).compare(&film(|i| 1.0 + noise(i, 2)))?;
+        let shifted = film(|i| 1.008 + noise(i, 1)).compare(&film(|i| 1.0 + noise(i, 2)), false)?;
         assert!(shifted.agree && shifted.p_value < 1e-4, "{}", shifted.p_value);
-        let spotted =
-            film(|i| if i % 100 == 0 { 3.0 } else { 1.0 + noise(i, 1) }).compare(&film(|i| 1.0 + noise(i, 2)))?;
+        let spotted = film(|i| if i % 100 == 0 { 3.0 } else { 1.0 + noise(i, 1) })
+            .compare(&film(|i| 1.0 + noise(i, 2)), false)?;
         assert!(!spotted.agree && spotted.beyond == 100, "{}", spotted.beyond);
         Ok(())
     }
@@ -186,7 +190,7 @@ mod tests {
     fn a_pixel_of_unknown_error_says_so() -> Result<()> {
         let mut broken = film(|_| 1.0);
         broken.main.m2[7] = f32::NAN;
-        let difference = broken.compare(&film(|_| 1.0))?;
+        let difference = broken.compare(&film(|_| 1.0), false)?;
         assert_eq!((difference.unknown, difference.pixels), (1, 9999));
         assert!(broken.random_noise().0.is_finite());
         Ok(())

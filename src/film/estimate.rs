@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Estimate, Film};
+use super::{Estimate, Film, Planned};
 
 /// The estimated error of a picture: root mean square over its pixels of the error of linear luminance, divided by the picture's mean
 /// luminance (absolute if that is 0). A part is null if it is not known, or not apart from the others.
@@ -20,12 +20,45 @@ pub struct ErrorEstimate {
     pub truncation: Option<f64>,
     /// The contribution of a field that is still being computed: the change since it had half its histories.
     pub field: Option<f64>,
+    /// What the planner's choice leaves out of the scene that was asked for, if it chose.
+    pub model: Option<f64>,
+    /// The planner's upper bound of the error, if the picture is the planned one.
+    pub planned: Option<f64>,
+    /// Whose bound the total is.
+    pub source: Source,
+}
+
+/// What a stated error is founded on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Default)]
+#[serde(rename_all = "snake_case")]
+pub enum Source {
+    /// The samples of the picture and of its probe.
+    #[default]
+    Picture,
+    /// What the planner's pilots measured: references of many samples, and the picture's own settings beside them.
+    Plan,
 }
 
 impl ErrorEstimate {
     /// All parts but the noise.
     pub fn bias(&self) -> f64 {
         [self.discretisation, self.resolution, self.truncation, self.field].into_iter().flatten().fold(0.0, f64::hypot)
+    }
+}
+
+impl ErrorEstimate {
+    /// The estimate beside a planner's. Its own bound knows nothing of what the plan leaves out. Both bounds hold, so the lesser is the better founded.
+    fn beside(self, planned: Option<Planned>) -> Self {
+        let Some(planned) = planned else { return self };
+        let own = self.total.map(|total| total.hypot(planned.bias));
+        let better = planned.bound.filter(|bound| own.is_none_or(|own| *bound < own));
+        Self {
+            total: better.or(own),
+            model: Some(planned.bias),
+            planned: planned.bound,
+            source: if better.is_some() { Source::Plan } else { Source::Picture },
+            ..self
+        }
     }
 }
 
@@ -55,7 +88,17 @@ impl Film {
             resolution: resolution.map(relative),
             truncation: truncation.map(relative),
             field: self.field_error,
+            ..ErrorEstimate::default()
         }
+        .beside(self.planned_now())
+    }
+
+    /// What the planner knows, with its bound if this picture is the planned one.
+    fn planned_now(&self) -> Option<Planned> {
+        let planned = self.planned?;
+        let is_whole = self.main.stride == 1 && self.lowered.is_none() && self.field_error.is_none();
+        let bound = planned.bound.filter(|_| is_whole && self.main.count >= planned.samples);
+        Some(Planned { bound, ..planned })
     }
 
     /// The most that is likely to lie behind the opacity at which rays end, relative.
@@ -179,6 +222,26 @@ mod tests {
         let reduced = Some(Reduced { step: 0.3, noise: Some(0.4) });
         let total = Film { reduced, ..film(1, None, None) }.error().total.unwrap_or(f64::NAN);
         assert!((total - 0.5).abs() < 1e-12, "{total}");
+    }
+
+    #[test]
+    fn the_better_founded_bound_is_stated_with_its_source() {
+        let own = film(4, None, Some(0.1)).error();
+        let of = |bound: Option<f64>, bias: f64, count: u32| {
+            let planned = Some(Planned { bound, samples: 4, bias });
+            let error = Film { planned, ..film(count, None, Some(0.1)) }.error();
+            (error.total, error.source)
+        };
+        assert_eq!((own.total, own.source, own.planned), (None, Source::Picture, None));
+        assert_eq!(of(Some(0.02), 0.01, 4), (Some(0.02), Source::Plan));
+        assert_eq!(of(Some(0.02), 0.01, 3), (None, Source::Picture), "fewer samples than planned");
+        assert_eq!(of(None, 0.01, 4), (None, Source::Picture), "another camera");
+        let known = Film { noisy: true, ..film(4, None, Some(0.1)) };
+        let own = known.error().total.unwrap_or(f64::NAN);
+        let with = |bound, bias| Film { planned: Some(Planned { bound, samples: 4, bias }), ..known.clone() }.error();
+        let beside = with(Some(2.0 * own), 0.5 * own);
+        assert_eq!((beside.source, beside.planned), (Source::Picture, Some(2.0 * own)));
+        assert!((beside.total.unwrap_or(f64::NAN) - own.hypot(0.5 * own)).abs() < 1e-12, "{beside:?}");
     }
 
     #[test]

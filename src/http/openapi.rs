@@ -101,7 +101,7 @@ const OPERATIONS: &[Operation] = &[
     ),
     get(
         "/v1/renders/{id}/difference",
-        "Whether this render and ?with=… (of another seed) are of the same picture: a map of z, with X-Cloudchamber-{P-Value,Pixels-Beyond,Agree}",
+        "Whether this render and ?with=… (of another seed) are of the same picture: a map of z, with X-Cloudchamber-{P-Value,Pixels-Beyond,Agree,Correlated}",
         &[(200, "image/png", "White: the same; red and blue: beyond noise"), (200, JSON, "The same in numbers")],
         &[404, 406, 409, 422],
     ),

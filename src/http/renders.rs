@@ -116,9 +116,10 @@ pub(super) async fn difference(
         return Err(Error::invalid("query:with", "missing", "the id of another render"));
     };
     let (one, other) = (app.render(&id)?, app.render(&with)?);
+    let correlated = one.seed() == other.seed();
     let (ours, theirs) = (app.service.engine().film(&one).await?, app.service.engine().film(&other).await?);
     let compared = tokio::task::spawn_blocking(move || -> Result<_> {
-        let difference = ours.compare(&theirs)?;
+        let difference = ours.compare(&theirs, correlated)?;
         let png = difference.png()?;
         Ok((difference, png))
     });
@@ -131,6 +132,7 @@ pub(super) async fn difference(
         ("X-Cloudchamber-P-Value", format!("{:.6e}", difference.p_value)),
         ("X-Cloudchamber-Pixels-Beyond", difference.beyond.to_string()),
         ("X-Cloudchamber-Agree", difference.agree.to_string()),
+        ("X-Cloudchamber-Correlated", difference.correlated.to_string()),
     ];
     Ok((told, png).into_response())
 }

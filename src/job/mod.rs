@@ -89,6 +89,14 @@ impl Job {
         })
     }
 
+    /// The seed of a render's random numbers; `None` for an export.
+    pub fn seed(&self) -> Option<u64> {
+        match &self.lock().task {
+            Task::Picture(scene) => Some(scene.seed()),
+            Task::File(_) => None,
+        }
+    }
+
     pub(crate) fn is_pilot(&self) -> bool {
         self.pilot
     }

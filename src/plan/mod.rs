@@ -28,6 +28,7 @@ use serde_json::{Value, json};
 use crate::asset::Assets;
 use crate::config::Limits;
 use crate::error::{Error, Result};
+use crate::film::Planned;
 use crate::job::Engine;
 use crate::render::{AUTO, Scene};
 use crate::technique::{self, Open, PreparedView, Setting, Settings, Technique};
@@ -115,6 +116,7 @@ impl Planner<'_> {
             work: chosen.amount.work,
             device_ms: chosen.device_ms,
             error: chosen.error,
+            bias: best.bias + best.bias_within,
             reasons,
             considered,
             features: seen.features,
@@ -189,21 +191,22 @@ impl Planner<'_> {
         Ok(settings.all.iter().map(|s| (s.words.clone(), reply::request(body, s))).collect())
     }
 
-    /// The request to render, and the planner's words about it. A request of another technique than `auto` stays as it is.
+    /// The request to render, with the planner's words about it and what it knows of the picture. A request of another technique than `auto` stays as it is.
     ///
     /// # Errors
     /// As [`Planner::plan`].
-    pub async fn resolve(&self, body: Value) -> Result<(Value, Option<Value>)> {
+    pub async fn resolve(&self, body: Value) -> Result<(Value, Option<(Value, Planned)>)> {
         if body["technique"] != AUTO {
             return Ok((body, None));
         }
         let plan = self.plan(&body).await?;
         let request = plan.request.clone();
+        let known = Planned { bound: Some(plan.bound(&body)), samples: plan.samples, bias: plan.bias };
         let mut words = serde_json::to_value(plan).map_err(Error::internal)?;
         if let Some(words) = words.as_object_mut() {
             words.retain(|name, _| name != "request");
         }
-        Ok((request, Some(words)))
+        Ok((request, Some((words, known))))
     }
 
     fn scene(&self, request: &Value) -> Result<Scene> {
@@ -226,7 +229,9 @@ impl Seen {
 
     /// The levels that may stand for the volume: their voxels are hardly wider than a pixel.
     fn levels(&self) -> Vec<usize> {
-        let fixed = self.scene.level().is_some() || self.simulated.is_some() || self.scene.view().shows_labels();
+        let fixed = self.scene.level().is_some()
+            || self.simulated.is_some()
+            || self.scene.view().shows_labels(self.scene.subject().volume().map(|v| &**v));
         let wide = |level: usize| self.features.pixels_per_voxel * (1u64 << level) as f64;
         (1..=MOST_LEVEL).take_while(|level| !fixed && wide(*level) <= WIDEST_PIXELS).collect()
     }

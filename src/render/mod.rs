@@ -1,6 +1,7 @@
 //! The validated request: the subject of a render, its camera, its technique and its budget. Fields are private: the contents of a [`Scene`] have
 //! been checked, and nothing downstream checks again.
 
+mod budget;
 mod export;
 pub(crate) mod region;
 mod schema;
@@ -14,12 +15,14 @@ use serde_json::{Map, Value};
 use crate::asset::Assets;
 use crate::config::Limits;
 use crate::error::{Error, Result};
+use crate::film::Planned;
 use crate::film::picture::Background;
-use crate::request::{self, BudgetRequest, CameraRequest, ImageRequest, RenderRequest};
+use crate::request::{self, CameraRequest, ImageRequest, RenderRequest};
 use crate::scene::camera::Camera;
 use crate::scene::clip::Clip;
 use crate::technique::{self, Kind, PreparedView, Setting, Subject, Technique, View};
 use crate::volume::Volume;
+pub use budget::Budget;
 pub use export::{ExportTask, export_schema};
 use region::Region;
 pub use schema::{parameters_schema, schema};
@@ -29,19 +32,6 @@ use shared::{own_parameters, where_it_was_given};
 pub const AUTO: &str = "auto";
 /// The default number of pixels along a side.
 const DEFAULT_SIDE: u32 = 512;
-/// The default number of samples: enough that the jitter's noise is below a grey level in most pictures.
-const DEFAULT_SAMPLES: u32 = 16;
-
-/// The budget of a render. The render stops at the first bound that is reached.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Budget {
-    /// The samples per pixel.
-    pub samples: u32,
-    /// The milliseconds since the render's start.
-    pub time_ms: Option<u64>,
-    /// The error, as the film estimates it.
-    pub max_error: Option<f64>,
-}
 
 /// A valid render request with its defaults resolved.
 #[derive(Clone)]
@@ -63,6 +53,7 @@ pub struct Scene {
     seed: u64,
     places: u64,
     pilot: Option<Region>,
+    planned: Option<Planned>,
 }
 
 impl Scene {
@@ -92,7 +83,7 @@ impl Scene {
         let view = parse(&own, &format!("/{}", technique.name), assets)
             .map_err(|e| where_it_was_given(e, technique, &request))?;
         let subject = subject::of_request(request.volume.as_ref(), view.bounds(), assets, limits)?;
-        if view.shows_labels() && request.volume.as_ref().is_some_and(|v| v.level.is_some_and(|l| l > 0)) {
+        if view.shows_labels(None) && request.volume.as_ref().is_some_and(|v| v.level.is_some_and(|l| l > 0)) {
             return Err(Error::invalid("/volume/level", "there is no mean of labels", "0, or leave it out"));
         }
         let camera = Camera::from_request(request.camera.as_ref(), subject.bounds())?;
@@ -105,7 +96,7 @@ impl Scene {
         let background = background(&image)?;
         let image = [image.width.unwrap_or(DEFAULT_SIDE), image.height.unwrap_or(DEFAULT_SIDE)];
         let asked = request.budget.unwrap_or_default();
-        let (budget, asked_samples) = (budget(&asked, limits), asked.samples);
+        let (budget, asked_samples) = (Budget::of(&asked, limits), asked.samples);
         let scene = Self {
             technique,
             view,
@@ -123,6 +114,7 @@ impl Scene {
             seed: request.seed.unwrap_or(0),
             places: request.seed.unwrap_or(0),
             pilot: None,
+            planned: None,
         };
         scene.prepared_for_subject()
     }
@@ -166,8 +158,20 @@ impl Scene {
         Camera::from_request(Some(&request), self.subject.bounds())
     }
 
+    /// The scene as a planner chose it, with what the planner knows of its picture.
+    pub fn as_planned(self, planned: Option<Planned>) -> Self {
+        Self { planned, ..self }
+    }
+
+    /// What a planner knows of its picture.
+    pub fn planned(&self) -> Option<Planned> {
+        self.planned
+    }
+
     /// Sets another camera.
     pub fn set_camera(&mut self, camera: Camera) {
+        // The plan's bound is one of the first camera's picture.
+        self.planned = self.planned.map(|planned| Planned { bound: None, ..planned });
         self.camera = camera;
     }
 
@@ -266,6 +270,7 @@ impl Scene {
     pub fn seed(&self) -> u64 {
         self.seed
     }
+
     /// The seed of the places in a pixel. It is that of the request.
     pub fn places(&self) -> u64 {
         self.places
@@ -282,11 +287,4 @@ fn background(image: &ImageRequest) -> Result<Background> {
         (_, Some(true)) => Ok(Background::Transparent),
         (color, _) => Ok(Background::Colour(color.unwrap_or_default().map(|c| c as f32))),
     }
-}
-
-/// The budget of a request. One that names only a time or an error may take as many samples as the server permits.
-fn budget(request: &BudgetRequest, limits: &Limits) -> Budget {
-    let open = request.time_ms.is_some() || request.max_error.is_some();
-    let default = if open { limits.max_samples } else { DEFAULT_SAMPLES.min(limits.max_samples) };
-    Budget { samples: request.samples.unwrap_or(default), time_ms: request.time_ms, max_error: request.max_error }
 }

@@ -13,7 +13,7 @@ use crate::device::enums::{Count, DeviceEnum};
 use crate::device::{Buffer, Device};
 use crate::error::Result;
 use crate::film::picture::Background;
-use crate::film::{Film, Lowered};
+use crate::film::{Film, Lowered, Planned};
 use crate::job::SampleCounts;
 use crate::render::Scene;
 use crate::technique::{Random, ViewPlan};
@@ -48,11 +48,12 @@ pub(super) struct Gathered {
     pub counts: Buffer,
     /// The relative change of the picture since the field had half its histories.
     pub field_error: Option<f64>,
+    planned: Option<Planned>,
     random: Option<Random>,
     stepless: bool,
     biased: bool,
     opacity_threshold: f64,
-    /// True if the probe's rays go to their end at longer steps, where others end early.
+    /// True if the probe's rays go to their end at other steps, where others end early.
     to_the_end: bool,
     background: Background,
     encoder: Encoder,
@@ -63,14 +64,14 @@ pub(super) struct Gathered {
 }
 
 impl Gathered {
-    /// Room for the samples that `plan` takes of a scene; `table` makes the kernel's table for a step. The memory of `before` is used again if it has
-    /// the same size. `to_the_end` is true if the probe's rays go to their end, where others end early.
+    /// Room for the samples that `plan` takes of a scene; `table` makes the kernel's table for a step, and `steps` are the probe's. The memory of
+    /// `before` is used again if it has the same size.
     pub fn new(
         context: &mut DeviceContext,
         scene: &Scene,
         mut table: impl FnMut(&Device, f32) -> Result<Rc<Buffer>>,
         plan: &ViewPlan,
-        (to_the_end, smallest_side): (bool, f32),
+        steps: Steps,
         before: Option<Self>,
     ) -> Result<Self> {
         let region = scene.region();
@@ -87,7 +88,6 @@ impl Gathered {
         };
         let mut layer = |stride, step, room| Layer::new(device, scene, table(device, step)?, stride, step, 1, room);
         let layers = [layer(sparse, 2.0 * plan.step, of_preview)?, layer(1, plan.step, of_main)?];
-        let steps = Steps { step: plan.step, stepless: plan.stepless, smallest_side };
         let is_probed = scene.view().random().is_none() && !scene.is_pilot();
         let probe = || Probe::new(device, scene, steps, |step| table(device, step), of_probe);
         Ok(Self {
@@ -99,10 +99,11 @@ impl Gathered {
             counts: device.upload(&[0; 32], 0)?,
             field_error: None,
             random: scene.view().random(),
+            planned: scene.planned(),
             stepless: plan.stepless,
             biased: plan.biased,
             opacity_threshold: plan.opacity_threshold,
-            to_the_end,
+            to_the_end: steps.to_the_end,
             background: scene.background(),
             encoder,
             encoded: None,
@@ -202,7 +203,7 @@ impl Gathered {
             None => self.encode_anew(context)?,
         };
         self.encoded = Some(film.clone());
-        Ok(Film { field_error: self.field_error, ..film })
+        Ok(Film { field_error: self.field_error, planned: self.planned, ..film })
     }
 
     fn encode_anew(&mut self, context: &DeviceContext) -> Result<Film> {
@@ -242,6 +243,7 @@ impl Gathered {
             background: self.background,
             lowered,
             reduced,
+            planned: self.planned,
             rounds: self.rounds.all(),
         })
     }
@@ -266,8 +268,8 @@ impl Gathered {
 
     /// Takes over the samples of a pass of the probe.
     pub fn probe_passed(&mut self, context: &DeviceContext) -> Result<()> {
-        let Self { probe, layers, to_the_end, .. } = self;
-        probe.iter_mut().try_for_each(|probe| probe.passed(context, &layers[1], *to_the_end))
+        let Self { probe, layers, .. } = self;
+        probe.iter_mut().try_for_each(|probe| probe.passed(context, &layers[1]))
     }
 
     fn read_counts(&self, context: &DeviceContext) -> Result<SampleCounts> {

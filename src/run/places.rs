@@ -6,6 +6,7 @@ use std::f64::consts::TAU;
 use glam::Vec2;
 
 use crate::device::structs::View as DeviceView;
+use crate::split_mix::SplitMix64;
 
 /// The number of samples before the quarter turns: `FIRST_PLACES` of the kernels.
 const FIRST: u32 = 4;
@@ -28,7 +29,7 @@ pub(super) struct Places {
 }
 
 /// The shifts that are tried, and the numbers of samples at which they are judged.
-const TRIED: u64 = 16;
+const TRIED: usize = 16;
 const JUDGED_AT: [u32; 3] = [8, 16, 64];
 
 thread_local! {
@@ -41,15 +42,15 @@ impl Places {
         if let Some((_, places)) = LAST.get().filter(|(last, _)| *last == seed) {
             return places;
         }
-        let state = split_mix(seed);
-        let turn = (split_mix(state) >> 11) as f64 * 2.0f64.powi(-53) * TAU;
+        let mut random = SplitMix64::new(seed);
+        let turn = random.unit() * TAU;
         let first = std::array::from_fn(|n| {
             let (sin, cos) = (turn + n as f64 / 3.0 * TAU).sin_cos();
             let radius = if n == 0 { 0.0 } else { 2.0f64.sqrt() / 3.0 };
             Vec2::new((0.5 + radius * cos) as f32, (0.5 + radius * sin) as f32)
         });
-        let shifted = (1..=TRIED).map(|i| {
-            let word = split_mix(state.wrapping_add(i));
+        let shifted = (0..TRIED).map(|_| {
+            let word = random.bits();
             Self { shift: [word as u32, (word >> 32) as u32], first }
         });
         let judged = shifted.map(|places| (places.discrepancy(), places));
@@ -92,14 +93,6 @@ impl Places {
         view.place_shift = self.shift;
         view.first_places = std::array::from_fn(|i| self.first[i / 2][i % 2]);
     }
-}
-
-/// The next output of SplitMix64 (Steele, Lea, Flood, OOPSLA 2014) after `state`.
-fn split_mix(state: u64) -> u64 {
-    let mut z = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }
 
 #[cfg(test)]

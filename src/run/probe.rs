@@ -1,5 +1,5 @@
 //! The probe of a picture: a few of its pixels are sampled again, with other random numbers and with other steps, so that the picture's error is
-//! known (`src/film/probed.rs`). It takes its samples after 1, 2, 4, 8, … samples of the picture. A pass takes many samples of each pixel, side by
+//! known (`src/film/probed.rs`). It takes its samples after 1, 4, 8, 16, … samples of the picture. A pass takes many samples of each pixel, side by
 //! side in a film of its own, so that the rays of a packet lie close together.
 
 mod sets;
@@ -24,6 +24,7 @@ const SPARSE_FROM: usize = 200;
 const CLUSTER: u32 = 1;
 /// The least number of a picture's samples from which the probe looks closely.
 pub(super) const CLOSELY: u32 = 4;
+
 /// The probe of a view whose samples are spread evenly.
 pub(super) struct Probe {
     /// The film of the pass under way.
@@ -169,7 +170,7 @@ impl Probe {
     }
 
     /// Takes over the samples of a pass. Once it has all that judge the step, it does so.
-    pub fn passed(&mut self, context: &DeviceContext, main: &Layer, to_the_end: bool) -> Result<()> {
+    pub fn passed(&mut self, context: &DeviceContext, main: &Layer) -> Result<()> {
         let (layer, set) = (&self.layer, &mut self.sets[self.at]);
         let Some(batch) = layer.batch else { return Ok(()) };
         let [wide, high] = layer.film_size();
@@ -189,7 +190,7 @@ impl Probe {
         }
         if self.has_all(main.samples) && !self.steps.stepless {
             let shorter = self.steps.step / self.steps.of(Step::Fine);
-            self.step = Some(ProbedStep::of(&self.step_pixels(), f64::from(shorter), to_the_end));
+            self.step = Some(ProbedStep::of(&self.step_pixels(), f64::from(shorter), self.steps.to_the_end));
         }
         Ok(())
     }

@@ -19,6 +19,7 @@ use super::gathered::{Gathered, Pass};
 use super::layer::packets_of_beam;
 use super::motion::{Motion, Moving};
 use super::places::Places;
+use super::probe::Steps;
 use super::warnings::warnings;
 use crate::device::structs::View as DeviceView;
 use crate::device::{Buffer, Device, Resume, SliceLength};
@@ -100,8 +101,13 @@ impl ViewRun {
         let table = |device: &Device, step| table(device, volume.as_deref(), &scene, &*prepared, step);
         let to_the_end = prepared.parameters_to_the_end(scene.camera());
         let smallest = prepared.volume().map_or(bounds.smallest_side(), |volume| volume.smallest_side());
-        let probed = (to_the_end.is_some(), smallest as f32);
-        let gathered = Gathered::new(context, &scene, table, &plan, probed, before)?;
+        let steps = Steps {
+            step: plan.step,
+            stepless: plan.stepless,
+            smallest_side: smallest as f32,
+            to_the_end: to_the_end.is_some(),
+        };
+        let gathered = Gathered::new(context, &scene, table, &plan, steps, before)?;
         let device = &context.device;
         let parameters = device.upload(&prepared.parameters(scene.camera()), 0)?;
         let to_the_end = to_the_end.map(|own| device.upload(&own, 0)).transpose()?;

@@ -27,10 +27,10 @@ pub struct Camera {
 
 fn finite(v: [f64; 3], at: &str) -> Result<DVec3> {
     let v = DVec3::from(v);
-    if v.is_finite() && v.abs().max_element() <= 1e9 {
+    if v.is_finite() && v.abs().max_element() <= 1e13 {
         Ok(v)
     } else {
-        Err(Error::invalid(at, "out of range", "-1e9 to 1e9"))
+        Err(Error::invalid(at, "out of range", "-1e13 to 1e13"))
     }
 }
 
@@ -86,8 +86,8 @@ impl Camera {
         let matrix = DMat4::from_cols_array(&columns);
         let rotation = DMat3::from_mat4(matrix);
         let rigid = "a rigid transform: orthonormal axes, no scale, no mirror, last row 0 0 0 1";
-        if !matrix.is_finite() || columns.iter().any(|c| c.abs() > 1e9) {
-            return Err(Error::invalid(at, "not finite or out of range", "numbers from -1e9 to 1e9"));
+        if !matrix.is_finite() || columns.iter().any(|c| c.abs() > 1e13) {
+            return Err(Error::invalid(at, "not finite or out of range", "numbers from -1e13 to 1e13"));
         }
         if rotation.determinant().abs() < 1e-9 {
             return Err(Error::invalid(at, "the matrix is singular", rigid));

@@ -45,7 +45,7 @@ pub struct LightSource {
     /// `point`: power per steradian. Default 1.
     pub(super) intensity: Option<Spectrum>,
     /// `sphere`.
-    #[schemars(range(min = 1e-9, max = 1e9))]
+    #[schemars(range(min = 1e-12, max = 1e13))]
     pub(super) radius: Option<f64>,
     /// `quad`: a corner, in the world.
     pub(super) corner: Option<[f64; 3]>,
@@ -137,8 +137,8 @@ impl LightSource {
         for (name, place) in
             [("position", self.position), ("corner", self.corner), ("edge_u", self.edge_u), ("edge_v", self.edge_v)]
         {
-            if place.is_some_and(|p| p.iter().any(|v| v.abs() > 1e9)) {
-                return Err(Error::invalid(format!("{at}/{name}"), "too far away", "-1e9 to 1e9"));
+            if place.is_some_and(|p| p.iter().any(|v| v.abs() > 1e13)) {
+                return Err(Error::invalid(format!("{at}/{name}"), "too far away", "-1e13 to 1e13"));
             }
         }
         if let (Some(u), Some(v)) = (self.edge_u, self.edge_v)

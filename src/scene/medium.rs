@@ -104,8 +104,8 @@ impl MediumRequest {
         }
         self.phase.check(&format!("{at}/phase"))?;
         match self.density_window {
-            Some([low, high]) if !((high - low).abs() >= 1e-30 && low.abs() <= 1e30 && high.abs() <= 1e30) => {
-                let permitted = "two values from -1e30 to 1e30, 1e-30 or more apart";
+            Some([low, high]) if !((high - low).abs() >= 1e-36 && low.abs() <= 1e36 && high.abs() <= 1e36) => {
+                let permitted = "two values from -1e36 to 1e36, 1e-36 or more apart";
                 Err(Error::invalid(format!("{at}/density_window"), "its ends are the same, or too large", permitted))
             }
             _ => Ok(()),
@@ -133,7 +133,9 @@ impl MediumRequest {
 
     /// The extinction per world unit at a density of 1, by colour.
     pub fn sigma_t_per_unit(&self, volume: &Volume) -> [f64; 3] {
-        let greatest = self.greatest_density(volume);
+        // Outliers would make all else transparent.
+        let data = volume.contents().map_or(volume.range(), |contents| contents.data);
+        let greatest = data.into_iter().map(|v| self.density_of(v)).fold(0.0, f64::max);
         let otherwise = DEFAULT_DEPTH / (super::mean_side(volume) * if greatest > 0.0 { greatest } else { 1.0 });
         self.sigma_t_per_unit.map_or([otherwise; 3], Spectrum::rgb)
     }

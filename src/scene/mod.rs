@@ -6,6 +6,7 @@ pub mod camera;
 pub mod clip;
 pub mod depth;
 pub mod interpolation;
+pub mod labels;
 pub mod light;
 mod light_source;
 pub mod lights;
@@ -13,7 +14,9 @@ pub mod medium;
 pub mod phase;
 pub mod presets;
 pub mod transfer;
+mod transfer_layout;
 mod transfer_request;
+pub mod transfer_table;
 pub mod window;
 
 use crate::volume::Volume;

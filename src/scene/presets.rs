@@ -72,37 +72,30 @@ const BLUE_YELLOW: PresetPoints = &[
     (1.0, 0xffe020, 8.0),
 ];
 
-/// True if a range of values looks like Hounsfield units: air far below 0 and bone far above.
-pub fn is_hounsfield(range: [f64; 2]) -> bool {
-    range[0] <= -500.0 && range[1] >= 600.0
-}
+/// Amounts below 0 are blue and those above red, the more opaque the further from 0. The colours are ColorBrewer's RdBu.
+const SIGNED: PresetPoints = &[
+    (0.0, 0x2166ac, 1.0),
+    (0.25, 0x67a9cf, 0.4),
+    (0.45, 0xd1e5f0, 0.0),
+    (0.55, 0xfddbc7, 0.0),
+    (0.75, 0xef8a62, 0.4),
+    (1.0, 0xb2182b, 1.0),
+];
 
-/// The points of a preset over a range of values; `full` is the extinction per world unit of opacity 1.
-pub fn points(name: &str, range: [f64; 2], full: f64) -> Vec<ControlPoint> {
+/// The points of a preset over a range of values, of Hounsfield units or others; `full` is the extinction per world unit of opacity 1.
+pub fn points(name: &str, range: [f64; 2], hounsfield: bool, full: f64) -> Vec<ControlPoint> {
     let (table, absolute) = match name {
-        "ct_bone" if is_hounsfield(range) => (CT_BONE_HOUNSFIELD, true),
+        "ct_bone" if hounsfield => (CT_BONE_HOUNSFIELD, true),
         "ct_bone" => (CT_BONE, false),
-        "bone_flesh" if is_hounsfield(range) => (BONE_FLESH_HOUNSFIELD, true),
+        "bone_flesh" if hounsfield => (BONE_FLESH_HOUNSFIELD, true),
         "bone_flesh" => (BONE_FLESH, false),
         "blue_yellow" => (BLUE_YELLOW, false),
         "mri_head" => (MRI_HEAD, false),
+        "signed" => (SIGNED, false),
         _ => (RAMP, false),
     };
     let [low, high] = if absolute { [0.0, 1.0] } else { range };
     table.iter().map(|&(f, rgb, opacity)| by_eye(low + (high - low) * f, rgb, opacity * full)).collect()
-}
-
-/// A colour and an opacity for each label up to `most`. Label 0 is empty; the hues of the others are a golden section of the colour circle
-/// apart, so that neighbours differ.
-pub fn labels(most: f64, full: f64) -> Vec<([f64; 3], f64)> {
-    let count = most.clamp(0.0, 4095.0) as u32;
-    (0..=count).map(|label| (label_color(label), if label == 0 { 0.0 } else { full })).collect()
-}
-
-/// The default colour of a label.
-pub fn label_color(label: u32) -> [f64; 3] {
-    let pure = hue((f64::from(label) * 0.618_033_988_749_895).fract());
-    pure.map(|c| 0.08 + 0.82 * c)
 }
 
 /// The nine colours of NVIDIA's CUDA sample `volumeRender`: display red, green, blue, and alpha.

@@ -1,19 +1,22 @@
 //! The transfer function: value to colour and opacity per unit length, as control points or a preset.
 
+use super::labels::Labels;
 use super::presets;
-pub use super::transfer_request::{ControlPoint, Label, TransferRequest};
+pub use super::transfer_request::{ControlPoint, TransferRequest};
 use crate::error::{Error, Result, Violation};
-use crate::volume::Volume;
+use crate::volume::{Contents, DataKind, Volume, is_hounsfield};
 
 /// The number of entries of the table that the device reads: `TABLE_SIZE` of the kernel.
 pub const TABLE_SIZE: usize = 4096;
+/// The part of the data's width above them at which what stands for no data begins.
+const BEYOND: f64 = 0.1;
 /// The optical depth of a preset's opacity 1 across the volume's mean side: nearly opaque, still soft.
 const PRESET_OPTICAL_DEPTH: f64 = 24.0;
 
 /// A valid transfer function for one volume.
 #[derive(Debug, Clone, PartialEq)]
 pub enum TransferFunction {
-    /// Linear between control points.
+    /// Linear between control points; two at one value are a step, and the value itself has what is after it.
     Points(Vec<ControlPoint>),
     /// The lecture's (C, alpha) = HLS((v / vmax + rotation) 360, 0.5, 1), pow(v / vmax, exponent).
     Hls {
@@ -26,23 +29,29 @@ pub enum TransferFunction {
         /// Opacity per world unit at full opacity.
         opacity_per_unit: f64,
     },
-    /// A colour and an opacity per world unit for each whole number from 0; other values are empty.
-    Labels(Vec<([f64; 3], f64)>),
+    /// Looks of whole numbers.
+    Labels(Labels),
 }
 
-/// The range of a preset's values. A field's brightest voxels are next to its source and would leave the rest dark, so its default range
-/// excludes them.
-fn span(given: Option<[f64; 2]>, volume: &Volume, at: &str) -> Result<[f64; 2]> {
+/// The range of a preset's values.
+fn span(given: Option<[f64; 2]>, contents: &Contents, at: &str) -> Result<[f64; 2]> {
     match given {
         Some([low, high]) if high > low => Ok([low, high]),
         Some([low, _]) => {
             Err(Error::invalid(format!("{at}/value_range/1"), "the range is empty", format!("more than {low}")))
         }
-        // At least a millionth of the largest value, so that the range is not empty.
-        None => Ok(volume.upper().map_or(volume.range(), |upper| {
-            let least = (volume.range()[1] * 1e-6).max(f64::MIN_POSITIVE);
-            [0.0, upper.max(least)]
-        })),
+        None => Ok(contents.window),
+    }
+}
+
+/// The preset that suits a kind of values.
+fn suitable(kind: DataKind) -> &'static str {
+    match kind {
+        DataKind::Density => "ramp",
+        DataKind::Hounsfield => "ct_bone",
+        DataKind::Labels => "labels",
+        DataKind::SignedMap => "signed",
+        DataKind::Intensity => "mri_head",
     }
 }
 
@@ -64,16 +73,13 @@ impl TransferFunction {
                 let given = "given beside preset";
                 return Err(Error::invalid(format!("{at}/labels"), given, "one of points, labels and preset"));
             }
-            return Self::from_labels(labels, at).map(|f| (f, format!("{} labels", labels.len())));
+            let found = Labels::from_request(labels, &format!("{at}/labels"))?;
+            return Ok((Self::Labels(found), format!("{} labels", labels.len())));
         }
-        let suits = match (volume.format(), presets::is_hounsfield(volume.range())) {
-            ("builtin" | "field", _) => "ramp",
-            (_, true) => "ct_bone",
-            (_, false) => "mri_head",
-        };
-        let preset = request.preset.as_deref().unwrap_or(suits);
+        let contents = volume.contents()?;
+        let preset = request.preset.as_deref().unwrap_or(suitable(contents.kind));
         let full = PRESET_OPTICAL_DEPTH / super::mean_side(volume);
-        let range = span(request.value_range, volume, at)?;
+        let range = span(request.value_range, contents, at)?;
         let function = match preset {
             "hls" => Self::Hls {
                 rotation: request.rotation.unwrap_or(0.0),
@@ -81,116 +87,58 @@ impl TransferFunction {
                 value_max: range[1],
                 opacity_per_unit: full,
             },
-            "labels" => Self::Labels(presets::labels(volume.range()[1], full)),
-            name => Self::Points(presets::points(name, range, full)),
+            "labels" => Self::Labels(Labels::Each(full)),
+            name => {
+                let given_hounsfield = request.value_range.is_some_and(is_hounsfield);
+                let hounsfield =
+                    contents.kind == DataKind::Hounsfield && request.value_range.is_none() || given_hounsfield;
+                // Both signs are seen alike.
+                let most = range[0].abs().max(range[1].abs());
+                let range = if name == "signed" && request.value_range.is_none() { [-most, most] } else { range };
+                let points = presets::points(name, range, hounsfield, full);
+                Self::Points(without_padding(points, contents))
+            }
         };
-        Ok((function, format!("the preset {preset}")))
+        let taken_for = match request.preset {
+            Some(_) => String::new(),
+            None => format!(", as {}", contents.words()),
+        };
+        Ok((function, format!("the preset {preset}{taken_for}")))
     }
 
     fn from_points(points: &[ControlPoint], at: &str) -> Result<Self> {
         let mut wrong = Vec::new();
         for (i, pair) in points.windows(2).enumerate() {
-            if pair[1].value <= pair[0].value {
-                let permitted = format!("more than {}", pair[0].value);
-                wrong.push(Violation::new(format!("{at}/points/{}/value", i + 1), "values must rise", permitted));
+            let falls = pair[1].value < pair[0].value;
+            let third = i > 0 && pair[1].value == points[i - 1].value;
+            if falls || third {
+                let least = if third { "more than" } else { "at least" };
+                let permitted = format!("{least} {}; two points at one value are a step", pair[0].value);
+                wrong.push(Violation::new(format!("{at}/points/{}/value", i + 1), "values must not fall", permitted));
             }
         }
         if wrong.is_empty() { Ok(Self::Points(points.to_vec())) } else { Err(Error::Invalid(wrong)) }
     }
 
-    fn from_labels(labels: &[Label], at: &str) -> Result<Self> {
-        let most = labels.iter().map(|l| l.label).max().unwrap_or(0) as usize;
-        let mut table = vec![([0.0; 3], 0.0); most + 1];
-        for (i, label) in labels.iter().enumerate() {
-            if labels[..i].iter().any(|other| other.label == label.label) {
-                return Err(Error::invalid(format!("{at}/labels/{i}/label"), "given twice", "each label once"));
-            }
-            let color = label.color.unwrap_or_else(|| presets::label_color(label.label));
-            table[label.label as usize] = (color, label.opacity_per_unit);
-        }
-        Ok(Self::Labels(table))
-    }
-
-    /// The interval of values in which the function changes. A table of the function has to cover it.
+    /// The interval of values in which the function changes; a point if it has one value.
     pub fn domain(&self) -> [f64; 2] {
-        let [low, high] = match self {
+        match self {
             Self::Points(points) => [points.first(), points.last()].map(|p| p.map_or(0.0, |p| p.value)),
             Self::Hls { value_max, .. } => [0.0, *value_max],
             Self::Labels(_) => [0.0, (TABLE_SIZE - 1) as f64],
-        };
-        if high > low { [low, high] } else { [low, low + 1.0] }
+        }
     }
 
     /// Linear colour and opacity per unit at a value.
     pub fn evaluate(&self, value: f64) -> ([f64; 3], f64) {
         match self {
             Self::Points(points) => evaluate_points(points, value),
-            Self::Labels(table) => table.get(value.round().max(0.0) as usize).copied().unwrap_or_default(),
+            Self::Labels(labels) => labels.look(value),
             Self::Hls { rotation, exponent, value_max, opacity_per_unit } => {
                 let v = if *value_max > 0.0 { (value / value_max).clamp(0.0, 1.0) } else { 0.0 };
                 (presets::hue((v + rotation).fract()), v.powf(*exponent) * opacity_per_unit)
             }
         }
-    }
-
-    /// The greatest derivative of the opacity per unit of length by the value, from the device's table.
-    pub fn steepest_slope(&self) -> f64 {
-        let [low, high] = self.domain();
-        let width = (high - low) / (TABLE_SIZE - 1) as f64;
-        let sigma = |i: usize| self.evaluate(low + width * i as f64).1;
-        (1..TABLE_SIZE).map(|i| (sigma(i) - sigma(i - 1)).abs() / width).fold(0.0, f64::max)
-    }
-
-    /// The device's table for pre-integrated steps, all as floats. Each entry has the integrals from the first entry of extinction and of
-    /// extinction times red, green and blue over the entries, then the integrands.
-    pub fn integrals(&self, opacity_scale: f64) -> Vec<u32> {
-        let [low, high] = self.domain();
-        let integrand = |i: usize| {
-            let (c, sigma) = self.evaluate(low + (high - low) * i as f64 / (TABLE_SIZE - 1) as f64);
-            [1.0, c[0], c[1], c[2]].map(|part| part * sigma * opacity_scale)
-        };
-        let (mut sum, mut before) = ([0.0; 4], integrand(0));
-        let mut table = Vec::with_capacity(8 * TABLE_SIZE);
-        for i in 0..TABLE_SIZE {
-            let here = integrand(i);
-            for part in 0..4 {
-                sum[part] += if i == 0 { 0.0 } else { 0.5 * (before[part] + here[part]) };
-            }
-            before = here;
-            table.extend(sum.iter().chain(&here).map(|v| (*v as f32).to_bits()));
-        }
-        table
-    }
-
-    /// The intervals of values that have an opacity in the device's table, in rising order.
-    pub fn opaque(&self) -> Vec<[f64; 2]> {
-        let [low, high] = self.domain();
-        let width = (high - low) / (TABLE_SIZE - 1) as f64;
-        let mut intervals: Vec<[f64; 2]> = Vec::new();
-        for i in 0..TABLE_SIZE {
-            if self.evaluate(low + width * i as f64).1 <= 0.0 {
-                continue;
-            }
-            // Opacity begins at the entry before and ends at the entry after, less a small margin. The first and the last entry stand for
-            // all values beyond them.
-            let from = if i == 0 { f64::NEG_INFINITY } else { low + width * (i as f64 - 0.999) };
-            let to = if i == TABLE_SIZE - 1 { f64::INFINITY } else { low + width * (i as f64 + 0.999) };
-            match intervals.last_mut() {
-                Some(last) if last[1] >= from => last[1] = to,
-                _ => intervals.push([from, to]),
-            }
-        }
-        intervals
-    }
-
-    /// The entries of the device's table over [`TransferFunction::domain`]: linear colour and the opacity of `step` world units.
-    pub fn entries(&self, opacity_scale: f64, step: f64) -> Vec<([f64; 3], f64)> {
-        let [low, high] = self.domain();
-        let entry = |i: usize| {
-            let (color, sigma) = self.evaluate(low + (high - low) * i as f64 / (TABLE_SIZE - 1) as f64);
-            (color, -(-sigma * opacity_scale * step).exp_m1())
-        };
-        (0..TABLE_SIZE).map(entry).collect()
     }
 }
 
@@ -202,6 +150,20 @@ pub(crate) fn pack(color: [f64; 3], opacity: f64) -> [u32; 2] {
     let [red, green, blue] = [bits(color[0], 65535.0), bits(color[1], 65535.0), bits(color[2], 4095.0)];
     let opacity = ((opacity.clamp(0.0, 1.0) as f32).to_bits() + 0x200) & 0x3fff_fc00;
     [opacity | blue >> 2 | blue << 30, red << 7 | green >> 9 | green << 23]
+}
+
+/// A preset's points that leave out what stands for no data above all values.
+fn without_padding(mut points: Vec<ControlPoint>, contents: &Contents) -> Vec<ControlPoint> {
+    let [low, high] = contents.data;
+    let last =
+        points.last().copied().filter(|last| contents.padding.is_some_and(|padding| padding > last.value.max(high)));
+    if let (Some(last), Some(padding)) = (last, contents.padding) {
+        // Between a voxel with data and one without lie all values; only the first of them are seen.
+        let value = last.value.max(high + BEYOND * (high - low)).min(padding);
+        points.push(ControlPoint { value, ..last });
+        points.push(ControlPoint { value, opacity_per_unit: 0.0, ..last });
+    }
+    points
 }
 
 fn evaluate_points(points: &[ControlPoint], value: f64) -> ([f64; 3], f64) {
@@ -243,7 +205,20 @@ mod tests {
 
     #[test]
     fn unsorted_points_are_named() {
-        let wrong = TransferFunction::from_points(&[point(1.0, 0.0, 0.0), point(1.0, 0.0, 0.0)], "/t");
-        assert!(matches!(wrong, Err(Error::Invalid(v)) if v[0].pointer == "/t/points/1/value"));
+        for (values, at) in [(&[1.0, 0.5][..], 1), (&[1.0, 1.0, 1.0], 2)] {
+            let points: Vec<_> = values.iter().map(|value| point(*value, 0.0, 0.0)).collect();
+            let wrong = TransferFunction::from_points(&points, "/t");
+            let pointer = format!("/t/points/{at}/value");
+            assert!(matches!(wrong, Err(Error::Invalid(v)) if v[0].pointer == pointer));
+        }
+    }
+
+    #[test]
+    fn two_points_at_one_value_are_a_step() {
+        let points = [point(1.0, 0.0, 0.0), point(2.0, 0.0, 0.0), point(2.0, 1.0, 6.0), point(3.0, 1.0, 6.0)];
+        assert!(TransferFunction::from_points(&points, "/t").is_ok());
+        for (value, grey, sigma) in [(1.999, 0.0, 0.0), (2.0, 1.0, 6.0), (2.5, 1.0, 6.0)] {
+            assert_eq!(evaluate_points(&points, value), ([grey; 3], sigma), "at {value}");
+        }
     }
 }

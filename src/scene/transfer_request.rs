@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct TransferRequest {
     /// `ramp`, `hls` (hue by value, opacity by power), `ct_bone`, `mri_head`, `bone_flesh` (ivory bone in translucent flesh),
-    /// `blue_yellow` (blue and transparent, then yellow and opaque) or `labels` (a colour a whole number, 0 is empty). Default: what
-    /// suits the volume.
-    #[schemars(extend("enum" = ["ramp", "hls", "ct_bone", "mri_head", "bone_flesh", "blue_yellow", "labels"]))]
+    /// `blue_yellow` (blue and transparent, then yellow and opaque), `signed` (blue below 0, red above) or `labels` (a colour a whole number,
+    /// 0 is empty). Default: what suits the volume.
+    #[schemars(extend("enum" = ["ramp", "hls", "ct_bone", "mri_head", "bone_flesh", "blue_yellow", "signed", "labels"]))]
     pub preset: Option<String>,
     /// `hls`: turns the hue, in turns.
     #[schemars(range(min = 0, max = 1))]
@@ -18,9 +18,10 @@ pub struct TransferRequest {
     /// `hls`: opacity = pow(v / vmax, exponent).
     #[schemars(range(min = 0.01, max = 20))]
     pub exponent: Option<f64>,
-    /// The values that a preset spans. Default: the volume's range; for a computed field, 0 to what 99.8 % of its voxels stay below.
+    /// The values that a preset spans. Default: the volume's window, without outliers and without what stands for no data; for a computed field, 0
+    /// to what 99.8 % of its voxels stay below.
     pub value_range: Option<[f64; 2]>,
-    /// Control points in rising order of value, linear between them, constant outside. Instead of a preset.
+    /// Control points in rising order of value, linear between them, constant outside. Two points at one value are a step. Instead of a preset.
     #[schemars(length(min = 1, max = 256))]
     pub points: Option<Vec<ControlPoint>>,
     /// The colours of a label volume, whose voxels are whole numbers. Instead of a preset.
@@ -40,7 +41,7 @@ impl TransferRequest {
 #[serde(deny_unknown_fields)]
 pub struct Label {
     /// The voxels' value.
-    #[schemars(range(min = 0, max = 4095))]
+    #[schemars(range(min = 0, max = 4_294_967_295_u32))]
     pub label: u32,
     /// Linear red, green, blue. Default: one of its own.
     #[schemars(inner(range(min = 0, max = 1)))]

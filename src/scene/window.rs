@@ -64,10 +64,13 @@ impl Window {
         Self { low, high: if high > low { high } else { low + least } }
     }
 
-    /// A window over the volume's range.
-    pub fn range(volume: &Volume) -> Self {
-        let [low, high] = volume.range();
-        Self::of(low, high)
+    /// The default window of a volume: most of its values.
+    ///
+    /// # Errors
+    /// As [`Volume::voxels`].
+    pub fn suitable(volume: &Volume) -> Result<Self> {
+        let [low, high] = volume.contents()?.window;
+        Ok(Self::of(low, high))
     }
 
     /// The scale and the offset of table entry = value × scale + offset.
@@ -79,7 +82,7 @@ impl Window {
 
 impl std::fmt::Display for Window {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{:.4} to {:.4}", self.low, self.high)
+        write!(f, "{:?} to {:?}", self.low as f32, self.high as f32)
     }
 }
 

@@ -33,6 +33,7 @@
 mod cases;
 mod cuda_sample;
 mod draw;
+mod labels;
 pub mod pieces;
 pub mod plan;
 pub mod regions;
@@ -76,6 +77,8 @@ device_struct! {
         pub table_scale: f32,
         /// See `table_scale`.
         pub table_offset: f32,
+        /// The knots of a table whose entries are not even; 0 if they are.
+        pub knots: i32,
         /// A ray ends if its transmittance is less than this.
         pub transmittance_floor: f32,
         /// Multiplies the picture.

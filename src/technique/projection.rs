@@ -138,7 +138,8 @@ pub struct Parameters {
     mode: Mode,
     /// How values lie between voxels. Default: `trilinear`.
     interpolation: Option<Interpolation>,
-    /// The values from the first to the last colour. Default: what suits the volume; for `xray`, 0 to 1.
+    /// The values from the first to the last colour. Default: what suits the volume, without outliers and what stands for no data; for `xray`, 0
+    /// to 1.
     window: Option<WindowRequest>,
     /// The colours.
     #[serde(default)]

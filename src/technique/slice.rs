@@ -18,7 +18,7 @@
 //! | `thickness` | world units | 0–10¹³ | 0: the plane itself |
 //! | `mode` | | `maximum`, `minimum`, `mean`: of the slab | `mean` |
 //! | `interpolation` | | `nearest`, `trilinear`, `b_spline`, `catmull_rom` | `trilinear` |
-//! | `window` | values | `level` and `width`, or `low` and `high` | the volume's range |
+//! | `window` | values | `level` and `width`, or `low` and `high` | most of the volume's values |
 //! | `color_map`, `invert` | | see the schema | `grey`, false |
 //! | `output` | | `color`, or `value`: the value itself in the EXR | `color` |
 //!
@@ -130,7 +130,8 @@ pub struct Parameters {
     mode: Mode,
     /// How values lie between voxels. Default: `trilinear`.
     interpolation: Option<Interpolation>,
-    /// The values from the first to the last colour. Default: the volume's range.
+    /// The values from the first to the last colour. Default: most of the volume's values, without outliers and what stands for no data; the reply
+    /// says which.
     window: Option<WindowRequest>,
     /// The colours.
     #[serde(default)]

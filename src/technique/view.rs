@@ -81,7 +81,7 @@ pub trait View: Send + Sync {
         true
     }
     /// True if values are labels, which have no mean.
-    fn shows_labels(&self) -> bool {
+    fn shows_labels(&self, _volume: Option<&Volume>) -> bool {
         false
     }
     /// The sampling scheme of a stochastic view; `None` for a deterministic one.

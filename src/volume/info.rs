@@ -2,7 +2,7 @@
 
 use super::builtin::{self, Builtin};
 use super::voxels::{Histogram, VoxelType};
-use super::{RawType, Volume};
+use super::{Contents, RawType, Volume};
 use crate::error::Result;
 use glam::DMat4;
 use serde_json::{Value, json};
@@ -45,10 +45,13 @@ pub struct VolumeInfo {
     pub slope: f64,
     /// value = raw · slope + inter.
     pub inter: f64,
+    /// What the values are taken for, where the volume was decoded for the answer. Defaults depend on it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contents: Option<Contents>,
     /// What was lost or assumed while reading.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
-    /// How many voxels have which value; left out of lists.
+    /// How many voxels have which value, without outliers and what stands for no data: these count to the ends. Left out of lists.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub histogram: Option<Histogram>,
 }
@@ -88,8 +91,9 @@ impl VolumeInfo {
             file_affine: volume.file_affine(),
             slope: volume.slope(),
             inter: volume.inter(),
+            contents: Some(volume.contents()?.clone()),
             notes: volume.notes().to_vec(),
-            histogram: Some(volume.histogram()?.clone()),
+            histogram: Some(volume.histogram_within(volume.contents()?.data)?),
         })
     }
 
@@ -116,14 +120,15 @@ impl VolumeInfo {
             file_affine: None,
             slope: 1.0,
             inter: 0.0,
+            contents: None,
             notes: Vec::new(),
             histogram: None,
         }
     }
 
-    /// The description without its histogram, for lists.
+    /// The description without its histogram and contents, for lists.
     pub(crate) fn brief(mut self) -> Self {
-        self.histogram = None;
+        (self.histogram, self.contents) = (None, None);
         self
     }
 }

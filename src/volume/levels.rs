@@ -11,7 +11,7 @@ use glam::{DAffine3, DMat3, DVec3};
 
 use super::parallel::over_slices;
 use super::voxels::{Sample, Voxels, with_slice};
-use super::{NewVolume, Volume};
+use super::{Contents, DataKind, NewVolume, Volume};
 use crate::error::Result;
 
 /// The coarsest level that a request may name.
@@ -34,7 +34,7 @@ impl Volume {
     /// As [`Volume::voxels`].
     pub fn level(self: &Arc<Self>, level: usize) -> Result<Arc<Self>> {
         let Some(place) = level.min(MOST_LEVEL).checked_sub(1) else { return Ok(self.clone()) };
-        let (voxels, bright_mean) = (self.voxels()?, self.bright_mean()?);
+        let (voxels, bright_mean, _) = (self.voxels()?, self.bright_mean()?, self.contents()?);
         Ok(self.levels[place].get_or_init(|| Arc::new(self.averaged(level, voxels, bright_mean))).clone())
     }
 
@@ -69,7 +69,14 @@ impl Volume {
             ..self.parts_with(voxels)
         };
         let world_from_index = DAffine3 { matrix3: matrix3 * DMat3::from_diagonal(scale), translation };
-        Self { bright_mean: OnceLock::from(bright_mean), ..self.derived(parts, world_from_index) }
+        let made = self.derived(parts, world_from_index);
+        // Means of labels are no labels.
+        let contents = made.contents.get().map(|contents| match contents.kind {
+            DataKind::Labels => Contents { kind: DataKind::Intensity, ..contents.clone() },
+            _ => contents.clone(),
+        });
+        let contents = contents.map_or_else(OnceLock::new, OnceLock::from);
+        Self { bright_mean: OnceLock::from(bright_mean), contents, ..made }
     }
 
     /// The parts that a volume made of this one takes over: all but its notes and its place as its file gives it.
@@ -93,14 +100,15 @@ impl Volume {
             _ => 0,
         };
         let made = Self::of_parts(parts, world_from_index, self.range, non_finite);
-        Self { histogram: self.histogram.clone(), upper: self.upper, ..made }
+        Self { histogram: self.histogram.clone(), contents: self.contents.clone(), upper: self.upper, ..made }
     }
 
     /// The bytes of the volume, of the levels that were made of it, and of all their words.
     pub(crate) fn bytes_in_all(&self) -> u64 {
         let words = self.words.get().and_then(Option::as_ref).map_or(0, |words| words.bytes());
         let levels = self.levels.iter().filter_map(OnceLock::get);
-        self.bytes() + words + levels.map(|level| level.bytes_in_all()).sum::<u64>()
+        let index = self.index.get().map_or(0, |indexed| indexed.volume.bytes());
+        self.bytes() + words + index + levels.map(|level| level.bytes_in_all()).sum::<u64>()
     }
 }
 

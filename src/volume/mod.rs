@@ -10,10 +10,13 @@
 mod away;
 mod bright;
 pub mod builtin;
+mod contents;
+mod indexed;
 mod inflate;
 mod info;
 mod levels;
 mod limits;
+mod magnitude;
 mod nifti;
 mod nrrd;
 mod nrrd_header;
@@ -29,6 +32,8 @@ mod voxels;
 mod words;
 
 pub use away::{DeviceGrid, GridStatistics};
+pub use contents::{Contents, DataKind, is_hounsfield};
+pub use indexed::Indexed;
 pub(crate) use inflate::is_gzip;
 pub use info::VolumeInfo;
 pub use levels::MOST_LEVEL;
@@ -88,6 +93,8 @@ pub struct Volume {
     upper: Option<f64>,
     levels: levels::Levels,
     words: words::Words,
+    index: indexed::Index,
+    contents: OnceLock<Contents>,
     /// The voxels, if they are on the device and not among the parts.
     away: Option<Away>,
 }
@@ -104,6 +111,7 @@ impl Volume {
         }
         let (mut parts, world_from_index) = parts.placed()?;
         let non_finite = parts.voxels.make_finite_or_nan();
+        let parts = parts.of_usual_magnitude();
         let range = match raw_range(&parts.voxels) {
             Some(raw) => physical_range(raw, parts.slope, parts.inter)?,
             None => [0.0; 2],
@@ -115,9 +123,22 @@ impl Volume {
 
     /// A volume of checked parts; what is not given is found when it is asked for.
     fn of_parts(parts: NewVolume, world_from_index: DAffine3, range: [f64; 2], non_finite: u64) -> Self {
-        let (histogram, bright_mean, levels, words) = Default::default();
+        let (histogram, bright_mean, levels, words, index, contents) = Default::default();
         let (upper, away) = (None, None);
-        Self { parts, world_from_index, range, non_finite, histogram, bright_mean, upper, levels, words, away }
+        Self {
+            parts,
+            world_from_index,
+            range,
+            non_finite,
+            histogram,
+            bright_mean,
+            upper,
+            levels,
+            words,
+            index,
+            contents,
+            away,
+        }
     }
 
     /// Voxels along x, y, z.
@@ -215,13 +236,24 @@ impl Volume {
         Ok(self.histogram.get_or_init(|| Histogram::new(&self.parts.voxels, self.slope(), self.inter(), self.range)))
     }
 
-    /// The mean of the finite voxels along a bright ray: one in fifty of the rays along the grid's axes is brighter.
+    /// The histogram of the values over a range; what is beyond counts to its ends.
+    ///
+    /// # Errors
+    /// As [`Volume::voxels`].
+    pub fn histogram_within(&self, range: [f64; 2]) -> Result<Histogram> {
+        if range == self.range {
+            return self.histogram().cloned();
+        }
+        Ok(Histogram::new(self.voxels()?, self.slope(), self.inter(), range))
+    }
+
+    /// The mean of the finite voxels along a bright ray, without outliers: one in fifty of the rays along the grid's axes is brighter.
     ///
     /// # Errors
     /// As [`Volume::voxels`].
     pub fn bright_mean(&self) -> Result<f64> {
-        let values = self.values()?;
-        Ok(*self.bright_mean.get_or_init(|| bright::bright_mean(self.dims(), values)))
+        let (values, data) = (self.values()?, self.contents()?.data);
+        Ok(*self.bright_mean.get_or_init(|| bright::bright_mean(self.dims(), values, data)))
     }
 
     /// The value that few voxels of a field exceed, those next to its source ([`GridStatistics::UPPER`]); `None` for other volumes.

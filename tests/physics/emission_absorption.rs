@@ -4,6 +4,7 @@ mod accuracy;
 mod agreement;
 mod cameras;
 mod closed_form;
+mod functions;
 pub(crate) mod oracle;
 mod programs;
 mod reference;

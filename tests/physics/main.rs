@@ -15,6 +15,7 @@ mod levels;
 mod photon_transport;
 mod pictures;
 mod projection;
+mod scales;
 mod single_scatter;
 mod slice;
 mod study;

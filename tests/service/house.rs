@@ -69,7 +69,7 @@ const ORDER: [&[&str]; 18] = [
     &["frame", "power_law"],
     &["asset"],
     &["volume"],
-    &["error"],
+    &["error", "split_mix"],
 ];
 
 #[test]

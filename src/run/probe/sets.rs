@@ -26,12 +26,14 @@ pub const SAME: [usize; 2] = [0, 2];
 pub const FINE: [usize; 2] = [1, 3];
 pub const TWICE: usize = 4;
 
-/// The step of a picture, world units, whether it plays a part, and the smallest voxel side.
+/// The step of a picture, world units, whether it plays a part, the smallest voxel side, and whether rays of other steps go to their end, where the
+/// picture's end early.
 #[derive(Debug, Clone, Copy)]
 pub struct Steps {
     pub step: f32,
     pub stepless: bool,
     pub smallest_side: f32,
+    pub to_the_end: bool,
 }
 
 impl Steps {

@@ -45,18 +45,18 @@ pub fn judge(bench: &Bench, truth: &Value, picture: &[f64], most_ms: f64) -> Res
         }
         let values: Vec<f64> = means[0].iter().zip(&means[1]).map(|(a, b)| 0.5 * (a + b)).collect();
         // Each of the two is wrong by half of their difference, as their mean is.
-        let known_to = measure(&means[..1], &values)?.rmse.hypot(by_step);
+        let noise = measure(&means[..1], &values)?.rmse;
         let apart = measure(std::slice::from_ref(&picture.to_vec()), &values)?.rmse;
-        let error = (apart.powi(2) - known_to.powi(2)).max(0.0).sqrt();
-        let judged = Judged { error, known_to };
+        let error = (apart.powi(2) - noise.powi(2)).max(0.0).sqrt();
+        let judged = Judged { error, known_to: noise.hypot(by_step) };
         if by_step > TOO_MUCH * apart {
             return Ok(None);
         }
-        if known_to <= ENOUGH * apart || apart < NOTHING {
+        if noise <= ENOUGH * apart || apart < NOTHING {
             return Ok(Some(judged));
         }
         if 4 * samples > MOST_SAMPLES || 5.0 * spent > most_ms {
-            return Ok((known_to <= TOO_MUCH * apart).then_some(judged));
+            return Ok((judged.known_to <= TOO_MUCH * apart).then_some(judged));
         }
         samples *= 4;
     }

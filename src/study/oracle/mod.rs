@@ -11,23 +11,21 @@ pub use paths::{Light, Medium, henyey_greenstein};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// A generator, SplitMix64 (Steele, Lea, Flood, OOPSLA 2014). It has nothing in common with the kernels' generator.
+use crate::split_mix::SplitMix64;
+
+/// A generator. It has nothing in common with the kernels' generator.
 #[derive(Debug, Clone)]
-pub struct Random(u64);
+pub struct Random(SplitMix64);
 
 impl Random {
     /// A generator with a stream of its own for every seed.
     pub fn new(seed: u64) -> Self {
-        Self(seed.wrapping_mul(0xD134_2543_DE82_EF95).wrapping_add(1))
+        Self(SplitMix64::new(seed.wrapping_mul(0xD134_2543_DE82_EF95).wrapping_add(1)))
     }
 
     /// A number strictly between 0 and 1.
     pub fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        (((z ^ (z >> 31)) >> 11) as f64 + 0.5) / (1u64 << 53) as f64
+        self.0.unit()
     }
 
     /// A unit vector, uniform over the sphere.

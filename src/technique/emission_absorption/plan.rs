@@ -15,6 +15,7 @@ use crate::scene::camera::Camera;
 use crate::scene::interpolation::Interpolation;
 use crate::scene::presets;
 use crate::scene::transfer::{TABLE_SIZE, TransferFunction, pack};
+use crate::scene::transfer_table::TransferTable;
 use crate::technique::stepping::{Way, stepping};
 use crate::technique::steps::coarse_step;
 use crate::technique::view::in_words;
@@ -25,7 +26,7 @@ use crate::volume::{Volume, VoxelType};
 const EARLY: f64 = 0.99;
 
 impl Parameters {
-    fn transfer_function(&self, volume: &Volume) -> Result<(TransferFunction, String)> {
+    pub(super) fn transfer_function(&self, volume: &Volume) -> Result<(TransferFunction, String)> {
         if let Some(sample) = &self.cuda_sample {
             let range = if volume.voxel_type() == VoxelType::U8 {
                 [volume.inter(), 255.0 * volume.slope() + volume.inter()]
@@ -58,33 +59,43 @@ impl Parameters {
 }
 
 /// The source of a sample's colour.
-enum Colours {
-    /// A transfer function of the value.
-    Function(TransferFunction),
+pub(super) enum Colours {
+    /// A transfer function of the value, and the knots of its table.
+    Function(Box<TransferTable>),
     /// Regions of value and gradient.
     Regions(Vec<Region>),
 }
 
 /// The view of a volume.
-struct Prepared {
-    parameters: Parameters,
-    volume: Arc<Volume>,
-    colours: Colours,
+pub(super) struct Prepared {
+    pub parameters: Parameters,
+    pub volume: Arc<Volume>,
+    pub colours: Colours,
     /// The function of the volume's own values, not of words, for [`PreparedView::steepest_slope`].
-    function_of_values: Option<TransferFunction>,
-    plan: ViewPlan,
+    pub function_of_values: Option<TransferTable>,
+    pub plan: ViewPlan,
 }
 
 impl Parameters {
     /// Half an entry of the table. The plain reference form, other orders and styles take values as they are.
-    fn resolution(&self, function: &TransferFunction) -> Result<Option<f64>> {
+    fn resolution(&self, table: &TransferTable) -> Result<Option<f64>> {
         let plain = [plain(Interpolation::Trilinear, false), plain(Interpolation::Trilinear, true)];
-        let [low, high] = function.domain();
-        Ok(plain.contains(self.features()?).then_some(0.5 * (high - low) / TABLE_SIZE as f64))
+        Ok(plain.contains(self.features()?).then_some(table.resolution()))
+    }
+
+    /// The table of the colours of a volume, and a description of their source.
+    fn transfer_table(&self, volume: &Volume) -> Result<(TransferTable, String)> {
+        let (function, named) = self.transfer_function(volume)?;
+        let [low, high] = volume.range();
+        // The weights of Catmull-Rom splines add up to 1.25³ at most besides what they take away, so that samples may be beyond all voxels.
+        let beyond = if self.interpolation() == Interpolation::CatmullRom { 0.5 * (high - low) } else { 0.0 };
+        let values = [low - beyond, high + beyond];
+        let table = if self.pre_integrated { TransferTable::of_integrals } else { TransferTable::new };
+        Ok((table(function, values), named))
     }
 
     /// The plan for a volume, whose values in `opaque` have an opacity; `named` is the description of the colours.
-    fn plan(&self, volume: &Volume, opaque: Vec<[f64; 2]>, named: String) -> Result<ViewPlan> {
+    pub(super) fn plan(&self, volume: &Volume, opaque: Vec<[f64; 2]>, named: String) -> Result<ViewPlan> {
         let skip = self.empty_space_skipping && self.order == "front_to_back";
         let mut reasons = vec![named];
         if !skip {
@@ -105,8 +116,19 @@ impl Parameters {
 
 impl View for Parameters {
     fn prepare(&self, subject: &Subject) -> Result<Arc<dyn PreparedView>> {
-        let parameters = self.clone();
         let volume = subject.needed_volume()?;
+        let parameters = self.suiting(Some(volume));
+        parameters.prepared(volume)
+    }
+
+    fn shows_labels(&self, volume: Option<&Volume>) -> bool {
+        self.suiting(volume).labels()
+    }
+}
+
+impl Parameters {
+    fn prepared(self, volume: &Arc<Volume>) -> Result<Arc<dyn PreparedView>> {
+        let parameters = self.clone();
         if let Some(regions) = &self.regions {
             let named = format!("{} regions of value and gradient", regions.len());
             let plan = self.plan(volume, regions::opaque(regions), named)?;
@@ -119,21 +141,20 @@ impl View for Parameters {
                 plan,
             }));
         }
-        let (of_values, mut named) = self.transfer_function(volume)?;
-        let (looked_at, words) = in_words(volume, self.resolution(&of_values)?);
-        let mut function = of_values.clone();
-        if words.is_some() {
-            (function, named) = self.transfer_function(&looked_at)?;
+        if self.labels() && volume.range()[1] > (TABLE_SIZE - 1) as f64 {
+            return self.prepared_by_places(volume);
         }
-        let mut plan = self.plan(&looked_at, function.opaque(), format!("transfer function: {named}"))?;
+        let (of_values, mut named) = self.transfer_table(volume)?;
+        let (looked_at, words) = in_words(volume, self.resolution(&of_values)?);
+        let mut table = of_values.clone();
+        if words.is_some() {
+            (table, named) = self.transfer_table(&looked_at)?;
+        }
+        let mut plan = self.plan(&looked_at, table.opaque(), format!("transfer function: {named}"))?;
         plan.reasons.extend(words);
         let function_of_values = (!self.labels()).then_some(of_values);
-        let colours = Colours::Function(function);
+        let colours = Colours::Function(Box::new(table));
         Ok(Arc::new(Prepared { parameters, volume: looked_at, colours, function_of_values, plan }))
-    }
-
-    fn shows_labels(&self) -> bool {
-        self.labels()
     }
 }
 
@@ -153,7 +174,10 @@ impl Prepared {
                 device.gradient_scale = (volume.slope().abs() * 255.0 / steep) as f32;
                 (values, 256)
             }
-            Colours::Function(function) => (function.domain(), TABLE_SIZE),
+            Colours::Function(table) => {
+                device.knots = table.knots().0 as i32;
+                (table.domain(), TABLE_SIZE)
+            }
         };
         let per_value = (entries - 1) as f64 / (high - low);
         device.table_scale = (volume.slope() * per_value) as f32;
@@ -212,10 +236,13 @@ impl PreparedView for Prepared {
         let (own, step) = (&self.parameters, f64::from(step));
         match &self.colours {
             Colours::Regions(regions) => regions::table(regions, &self.volume, own.opacity_scale, step),
-            Colours::Function(function) if own.pre_integrated => function.integrals(own.opacity_scale),
-            Colours::Function(function) => {
-                let entries = function.entries(own.opacity_scale, step);
-                entries.iter().flat_map(|&(color, opacity)| pack(color, opacity)).chain(pieces(&entries)).collect()
+            Colours::Function(table) if own.pre_integrated => {
+                [table.integrals(own.opacity_scale), table.knots().1].concat()
+            }
+            Colours::Function(table) => {
+                let entries = table.entries(own.opacity_scale, step);
+                let packed = entries.iter().flat_map(|&(color, opacity)| pack(color, opacity));
+                packed.chain(pieces(&entries)).chain(table.knots().1).collect()
             }
         }
     }

@@ -22,7 +22,7 @@ pub struct Region {
     #[schemars(inner(range(min = 0, max = 1)))]
     color: [f64; 3],
     /// Extinction per world unit in its middle.
-    #[schemars(range(min = 0, max = 1e6))]
+    #[schemars(range(min = 0, max = 1e18))]
     opacity_per_unit: f64,
     /// The part of its half width over which it fades: 0 is a box, 1 a tent.
     #[serde(default = "default_falloff")]

@@ -9,6 +9,7 @@ use crate::device::structs::{DeviceStruct, View as DeviceView};
 use crate::error::Result;
 use crate::scene::interpolation::Interpolation;
 use crate::scene::transfer::TABLE_SIZE;
+use crate::scene::transfer_table::KNOTS;
 use crate::technique::view_words;
 use crate::volume::VoxelType;
 
@@ -75,7 +76,7 @@ pub(super) fn source() -> Source {
         kernel: TECHNIQUE.name,
         words: || {
             view_words()
-                + &[define("TABLE_SIZE", TABLE_SIZE), define("PIECES", PIECES)].concat()
+                + &[define("TABLE_SIZE", TABLE_SIZE), define("PIECES", PIECES), define("KNOTS", KNOTS)].concat()
                 + &Resume::opencl_text_of_beams("RADIANCE", STATE_WORDS)
         },
         structs: || vec![DeviceView::LAYOUT, EmissionAbsorption::LAYOUT],

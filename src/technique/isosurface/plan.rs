@@ -113,8 +113,11 @@ impl View for Parameters {
         let wanted = features(self.interpolation(), self.layered(&surfaces));
         let features = permitted(wanted)?;
         let smallest = volume.smallest_side();
-        let values: Vec<String> = surfaces.iter().map(|s| format!("{:.4}", s.isovalue)).collect();
+        let values: Vec<String> = surfaces.iter().map(|s| format!("{:?}", s.isovalue as f32)).collect();
         let mut reasons = vec![format!("isovalues: {}", values.join(", "))];
+        if self.isovalue.is_none() && self.surfaces.is_none() {
+            reasons.push(volume.contents()?.words());
+        }
         if !self.empty_space_skipping {
             reasons.push("every sample is taken: skipping is off".into());
         }

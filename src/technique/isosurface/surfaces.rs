@@ -4,8 +4,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::error::{Error, Result};
-use crate::scene::presets::is_hounsfield;
-use crate::volume::Volume;
+use crate::volume::{DataKind, Volume};
 
 /// The most surfaces of a render.
 pub const MOST_SURFACES: usize = 8;
@@ -65,10 +64,11 @@ pub fn check(surfaces: &[Surface], at: &str) -> Result<()> {
 /// # Errors
 /// As [`Volume::voxels`].
 pub fn default_isovalue(volume: &Volume) -> Result<f64> {
-    if is_hounsfield(volume.range()) {
+    let contents = volume.contents()?;
+    if contents.kind == DataKind::Hounsfield {
         return Ok(BONE_HOUNSFIELD);
     }
-    let histogram = volume.histogram()?;
+    let histogram = volume.histogram_within(contents.data)?;
     let bins = histogram.counts.len();
     let (total, sum) = histogram
         .counts

@@ -14,13 +14,12 @@ use crate::error::Result;
 use crate::scene;
 use crate::scene::camera::Camera;
 use crate::scene::interpolation::Interpolation;
-use crate::scene::presets::is_hounsfield;
 use crate::scene::window::{Output, WINDOW_SIZE, Window};
 use crate::technique::stepping::{Way, stepping};
 use crate::technique::steps::coarse_step;
 use crate::technique::view::in_words;
 use crate::technique::{CellUse, Open, PreparedView, Settings, Subject, View, ViewPlan, view_words};
-use crate::volume::{Volume, VoxelType};
+use crate::volume::{DataKind, Volume, VoxelType};
 
 /// Words of a lane that a launch leaves to the next: a packet's best value.
 const STATE_WORDS: usize = 1;
@@ -85,9 +84,10 @@ impl Parameters {
         !self.peaks() || self.exact.unwrap_or(self.interpolation() == Interpolation::Nearest)
     }
 
-    fn zero_value(&self, volume: &Volume) -> f64 {
-        let suits = if is_hounsfield(volume.range()) { -1000.0 } else { volume.range()[0].min(0.0) };
-        self.zero_value.unwrap_or(suits)
+    fn zero_value(&self, volume: &Volume) -> Result<f64> {
+        let contents = volume.contents()?;
+        let suits = if contents.kind == DataKind::Hounsfield { -1000.0 } else { contents.data[0].min(0.0) };
+        Ok(self.zero_value.unwrap_or(suits))
     }
 
     /// The extinction per unit and value of an X-ray image; 0 for other projections, which have none.
@@ -98,7 +98,7 @@ impl Parameters {
         if let Some(given) = self.sigma_per_value {
             return Ok(given);
         }
-        let mean = (volume.bright_mean()? - self.zero_value(volume)).abs();
+        let mean = (volume.bright_mean()? - self.zero_value(volume)?).abs();
         let mean = if mean > 0.0 { mean } else { 1.0 };
         Ok(XRAY_OPTICAL_DEPTH / (mean * scene::mean_side(volume)))
     }
@@ -107,9 +107,9 @@ impl Parameters {
         if let Some(window) = &self.window {
             return window.check("/projection/window");
         }
-        let (low, side) = (volume.range()[0], scene::mean_side(volume));
+        let (low, side) = (volume.contents()?.data[0], scene::mean_side(volume));
         Ok(match self.mode {
-            Mode::Maximum | Mode::Minimum => Window::range(volume),
+            Mode::Maximum | Mode::Minimum => Window::suitable(volume)?,
             Mode::Mean => Window::of(low, volume.bright_mean()?),
             Mode::Sum => Window::of(low.min(0.0) * side, volume.bright_mean()?.max(0.0) * side),
             Mode::Xray => Window::of(0.0, 1.0),
@@ -122,7 +122,8 @@ struct Prepared {
     parameters: Parameters,
     volume: Arc<Volume>,
     window: Window,
-    sigma_per_value: f64,
+    /// The extinction per unit and value of an X-ray image, and the value without extinction.
+    absorption: [f64; 2],
     plan: ViewPlan,
 }
 
@@ -139,13 +140,16 @@ impl Parameters {
         let features = permitted(wanted)?;
         let smallest = volume.smallest_side();
         let mut reasons = vec![format!("window: {window}")];
+        if self.window.is_none() && self.output == Output::Color {
+            reasons.push(volume.contents()?.words());
+        }
         reasons.push(match (self.walked(), self.empty_space_skipping) {
             (true, _) => "exact for the interpolant: the step plays no part".into(),
             (_, true) => "what cannot show more than was seen is left out".into(),
             (_, false) => "every sample is taken: skipping is off".into(),
         });
         if self.mode == Mode::Xray {
-            let zero = self.zero_value(volume);
+            let zero = self.zero_value(volume)?;
             reasons.push(format!("extinction {sigma:.4e} per unit and value above {zero}"));
         }
         Ok(ViewPlan {
@@ -161,7 +165,7 @@ impl Parameters {
     }
 
     /// The device's parameters for a volume.
-    fn on_device(&self, volume: &Volume, window: &Window, sigma_per_value: f64) -> Projection {
+    fn on_device(&self, volume: &Volume, window: &Window, [sigma_per_value, zero_value]: [f64; 2]) -> Projection {
         let [window_scale, window_offset] = window.scale_and_offset();
         let wanted = if self.mode == Mode::Minimum { -1.0 } else { 1.0 };
         Projection {
@@ -170,7 +174,7 @@ impl Parameters {
             slope: volume.slope() as f32,
             inter: volume.inter() as f32,
             sigma_per_value: sigma_per_value as f32,
-            zero_value: self.zero_value(volume) as f32,
+            zero_value: zero_value as f32,
             window_scale,
             window_offset,
             raw_values: i32::from(self.output == Output::Value),
@@ -184,10 +188,10 @@ impl View for Parameters {
         let volume = subject.needed_volume()?;
         let (volume, words) = in_words(volume, self.resolution(&self.window(volume)?));
         let window = self.window(&volume)?;
-        let sigma_per_value = self.sigma_per_value(&volume)?;
-        let mut plan = self.plan(&volume, &window, sigma_per_value)?;
+        let absorption = [self.sigma_per_value(&volume)?, self.zero_value(&volume)?];
+        let mut plan = self.plan(&volume, &window, absorption[0])?;
         plan.reasons.extend(words);
-        Ok(Arc::new(Prepared { parameters: self.clone(), volume, window, sigma_per_value, plan }))
+        Ok(Arc::new(Prepared { parameters: self.clone(), volume, window, absorption, plan }))
     }
 }
 
@@ -211,7 +215,7 @@ impl PreparedView for Prepared {
     }
 
     fn parameters(&self, _camera: &Camera) -> Vec<u8> {
-        bytemuck::bytes_of(&self.parameters.on_device(&self.volume, &self.window, self.sigma_per_value)).to_vec()
+        bytemuck::bytes_of(&self.parameters.on_device(&self.volume, &self.window, self.absorption)).to_vec()
     }
 
     fn table(&self, _step: f32) -> Vec<u32> {

@@ -62,7 +62,7 @@ impl Plane {
 
 impl Parameters {
     fn window(&self, volume: &Volume) -> Result<Window> {
-        self.window.as_ref().map_or_else(|| Ok(Window::range(volume)), |w| w.check("/slice/window"))
+        self.window.as_ref().map_or_else(|| Window::suitable(volume), |w| w.check("/slice/window"))
     }
 }
 
@@ -80,6 +80,10 @@ impl View for Parameters {
         let window = self.window(&volume)?;
         let wanted = [("INTERPOLATION", self.interpolation.unwrap_or(Interpolation::Trilinear).code())];
         let features = permitted(wanted)?;
+        let mut reasons = vec![format!("window: {window}")];
+        if self.window.is_none() && self.output == Output::Color {
+            reasons.push(volume.contents()?.words());
+        }
         let plan = ViewPlan {
             variant: Variant::new(TECHNIQUE.name, Some(volume.voxel_type()), features),
             cells: CellUse::None,
@@ -88,7 +92,7 @@ impl View for Parameters {
             stepless: true,
             biased: false,
             opacity_threshold: 1.0,
-            reasons: vec![format!("window: {window}")],
+            reasons,
         };
         Ok(Arc::new(Prepared { parameters: self.clone(), volume, window, plan }))
     }

@@ -4,6 +4,8 @@
 //! gradient noise ("Improving noise", SIGGRAPH 2002) with the lattice's gradients hashed from the seed. Values are in
 //! [0, 1], 0 near the box's faces, so that the puff is never cut off.
 
+use crate::split_mix::mix;
+
 /// The radius of the undisturbed ball.
 const RADIUS: f64 = 0.5;
 /// The amplitude of the noise that moves its surface.
@@ -100,11 +102,4 @@ fn hash(lattice: [i64; 3], seed: u64) -> u64 {
     let keyed = lattice.iter().zip(KEYS).fold(seed, |sum, (&p, key)| sum.wrapping_add((p as u64).wrapping_mul(key)));
     // The upper bits are the better mixed ones.
     mix(keyed) >> 32
-}
-
-/// The finaliser of SplitMix64 (Steele, Lea & Flood 2014).
-fn mix(mut state: u64) -> u64 {
-    state = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    state = (state ^ (state >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    state ^ (state >> 31)
 }

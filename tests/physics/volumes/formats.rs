@@ -41,7 +41,7 @@ fn assert_values(volume: &Volume, raw: RawType, case: &str) {
     };
     assert_eq!(volume.voxel_type(), kept, "{case}");
     let expected: Vec<f32> = values().into_iter().map(|value| through(raw, value)).collect();
-    let found: Vec<f32> = (0..60).map(|i| volume.voxels().unwrap().get_f32(i)).collect();
+    let found: Vec<f32> = (0..60).map(|i| volume.values().unwrap().of(i) as f32).collect();
     assert_eq!(found, expected, "{case}");
     // The order is x fastest, then y, then z.
     assert_eq!(volume.values().unwrap().at(1, 2, 2), f64::from(expected[1 + 5 * (2 + 4 * 2)]), "{case}");

@@ -198,7 +198,7 @@ fn builtins_are_listed_unbuilt_and_built_once() {
     // The listed description of a built-in that is not built is that of the built one.
     let roomy = Assets::open(dir.path(), AssetLimits { max_resident_bytes: 1 << 30, ..LIMITS }).unwrap();
     let unbuilt = roomy.list_volumes().into_iter().find(|info| info.name == "constant").unwrap();
-    let built = VolumeInfo { histogram: None, ..roomy.builtin_info("constant", 128, 0).unwrap() };
+    let built = VolumeInfo { histogram: None, contents: None, ..roomy.builtin_info("constant", 128, 0).unwrap() };
     assert_eq!(unbuilt, built);
 }
 

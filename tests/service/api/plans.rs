@@ -117,6 +117,30 @@ async fn an_automatic_render_is_planned_rendered_and_explained() {
     let planned = &done["plan"]["planned"];
     assert!(planned["reasons"].as_array().is_some_and(|r| !r.is_empty()), "{planned}");
     assert_eq!(planned["technique"], done["plan"]["technique"]);
+    let parts = &done["error_parts"];
+    assert_eq!(parts["model"], planned["bias"], "{parts}");
+    assert!(["plan", "picture"].contains(&parts["source"].as_str().unwrap()), "{parts}");
+}
+
+#[tokio::test]
+async fn a_planned_frame_states_the_better_founded_error_and_its_source() {
+    let server = shared();
+    let api = Api::new(&server);
+    // The picture's own bound of one sample is wide. The plan knows from pilots that this is enough.
+    let points = json!([{"value": 0.1, "color": [1, 0.8, 0.5], "opacity_per_unit": 0}, {"value": 1, "color": [1, 1, 1], "opacity_per_unit": 6}]);
+    let body = json!({"technique": "auto", "volume": {"builtin": "gaussian", "resolution": 32}, "image": {"width": 83, "height": 83},
+        "budget": {"max_error": 0.03}, "emission_absorption": {"transfer_function": {"points": points}}});
+    let done = api.finish(&body).await;
+    let parts = &done["error_parts"];
+    assert!(done["error"].as_f64().is_some_and(|error| error <= 0.03), "{parts}");
+    assert!(parts["planned"].as_f64().is_some_and(|planned| planned <= 0.03), "{parts}");
+    let by_plan = done["error"] == parts["planned"];
+    assert_eq!(parts["source"], if by_plan { "plan" } else { "picture" }, "{parts}");
+    // What is not planned has no such parts.
+    let own = json!({"technique": "emission_absorption", "volume": {"builtin": "gaussian", "resolution": 32}, "image": {"width": 83, "height": 83},
+        "budget": {"samples": 4}});
+    let parts = api.finish(&own).await["error_parts"].clone();
+    assert_eq!((&parts["planned"], &parts["model"], &parts["source"]), (&json!(null), &json!(null), &json!("picture")));
 }
 
 #[tokio::test]

@@ -45,6 +45,11 @@ async fn two_techniques_are_compared_in_a_picture_with_a_p_value() {
         differs["p_value"].as_f64().unwrap() < 1e-6 && differs["mean_difference"].as_f64().unwrap() < 0.0,
         "{differs}"
     );
+    // Pictures of one seed share their noise, and the reply says so.
+    let again = rendered(&api, &scene("volume_path", 1)).await;
+    let shared = api.get(&path(&again)).await;
+    assert_eq!(shared.headers()["x-cloudchamber-correlated"], "true");
+    assert_eq!(differs["correlated"], false);
 
     let problem = api.get(&format!("{single}/difference")).await;
     assert_eq!(problem.status(), 422);

@@ -68,7 +68,11 @@ fn cases() -> Vec<(&'static str, Value, &'static str)> {
         ("/emission_absorption/transfer_function/preset", json!("rainbow"), ""),
         (POINTS, json!([]), ""),
         (POINTS, json!([point(1.0, 0.0), point(0.5, 1.0)]), "/emission_absorption/transfer_function/points/1/value"),
-        (POINTS, json!([point(1.0, 0.0), point(1.0, 1.0)]), "/emission_absorption/transfer_function/points/1/value"),
+        (
+            POINTS,
+            json!([point(1.0, 0.0), point(1.0, 1.0), point(1.0, 2.0)]),
+            "/emission_absorption/transfer_function/points/2/value",
+        ),
         (
             POINTS,
             json!([point(0.0, 0.0), point(1.0, -1.0)]),
