@@ -176,16 +176,12 @@ impl ProbedStep {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::split_mix::SplitMix64;
 
-    /// Uniform numbers of variance 1, by SplitMix64 (Steele, Lea, Flood, OOPSLA 2014).
+    /// Uniform numbers of variance 1.
     fn numbers(seed: u64) -> impl FnMut() -> f64 {
-        let mut state = seed;
-        move || {
-            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let mut z = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            12.0f64.sqrt() * (((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64 - 0.5)
-        }
+        let mut random = SplitMix64::new(seed);
+        move || 12.0f64.sqrt() * (random.unit() - 0.5)
     }
 
     #[test]

@@ -102,10 +102,11 @@ impl Contents {
             DataKind::Intensity => "the volume is taken for intensities".to_owned(),
         };
         if let Some(padding) = self.padding {
-            words += &format!("; {padding} is taken for no data");
+            words += &format!("; {:?} is taken for no data", padding as f32);
         }
         if self.beyond {
-            words += &format!("; a few values are beyond its window, {:.6} to {:.6}", self.window[0], self.window[1]);
+            let [low, high] = self.window.map(|value| value as f32);
+            words += &format!("; a few values are beyond its window, {low:?} to {high:?}");
         }
         words
     }
@@ -159,7 +160,7 @@ impl Ends {
     }
 }
 
-/// The number of distinct values of a sorted list, or [`MOST_LABELS`] if it has more.
+/// The number of distinct values of a sorted list, or one more than [`MOST_LABELS`] if it has more.
 fn distinct(sorted: &[f64]) -> usize {
     let (mut count, mut at) = (0, 0);
     while at < sorted.len() && count <= MOST_LABELS {

@@ -33,7 +33,7 @@ mod words;
 
 pub use away::{DeviceGrid, GridStatistics};
 pub use contents::{Contents, DataKind, is_hounsfield};
-pub use indexed::Indexed;
+pub use indexed::{Indexed, MOST_VALUES};
 pub(crate) use inflate::is_gzip;
 pub use info::VolumeInfo;
 pub use levels::MOST_LEVEL;

@@ -1,6 +1,7 @@
 //! Files as other programs write them, byte by byte, so that the readers are not tested against themselves.
 
 use cloudchamber::error::{Error, Result};
+use cloudchamber::split_mix::mix;
 use cloudchamber::volume::{RawType, Volume, VolumeLimits, read};
 use flate2::{Compression, write::GzEncoder};
 use std::io::Write;
@@ -154,10 +155,7 @@ pub struct Random(pub u64);
 impl Random {
     pub fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut mixed = self.0;
-        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        mixed ^ (mixed >> 31)
+        mix(self.0)
     }
 
     pub fn below(&mut self, end: usize) -> usize {

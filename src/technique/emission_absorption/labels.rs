@@ -6,10 +6,13 @@ use super::Parameters;
 use super::plan::{Colours, Prepared};
 use crate::error::{Error, Result};
 use crate::scene::labels::Labels;
-use crate::scene::transfer::{TransferFunction, TransferRequest};
+use crate::scene::transfer::{TABLE_SIZE, TransferFunction, TransferRequest};
 use crate::scene::transfer_table::TransferTable;
 use crate::technique::PreparedView;
-use crate::volume::{DataKind, Volume};
+use crate::volume::{DataKind, MOST_VALUES, Volume};
+
+/// Each place in the list of labels has an entry of its own.
+const _: () = assert!(MOST_VALUES <= TABLE_SIZE);
 
 impl Parameters {
     /// The parameters with labels' looks, if the volume holds labels and nothing that is given speaks against it.

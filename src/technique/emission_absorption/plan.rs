@@ -60,7 +60,7 @@ impl Parameters {
 
 /// The source of a sample's colour.
 pub(super) enum Colours {
-    /// A transfer function of the value, and the knots of its table.
+    /// A transfer function of the value, with its table.
     Function(Box<TransferTable>),
     /// Regions of value and gradient.
     Regions(Vec<Region>),
@@ -117,8 +117,7 @@ impl Parameters {
 impl View for Parameters {
     fn prepare(&self, subject: &Subject) -> Result<Arc<dyn PreparedView>> {
         let volume = subject.needed_volume()?;
-        let parameters = self.suiting(Some(volume));
-        parameters.prepared(volume)
+        self.suiting(Some(volume)).prepared(volume)
     }
 
     fn shows_labels(&self, volume: Option<&Volume>) -> bool {
@@ -128,13 +127,12 @@ impl View for Parameters {
 
 impl Parameters {
     fn prepared(self, volume: &Arc<Volume>) -> Result<Arc<dyn PreparedView>> {
-        let parameters = self.clone();
         if let Some(regions) = &self.regions {
             let named = format!("{} regions of value and gradient", regions.len());
             let plan = self.plan(volume, regions::opaque(regions), named)?;
             let colours = Colours::Regions(regions.clone());
             return Ok(Arc::new(Prepared {
-                parameters,
+                parameters: self,
                 volume: volume.clone(),
                 colours,
                 function_of_values: None,
@@ -154,7 +152,7 @@ impl Parameters {
         plan.reasons.extend(words);
         let function_of_values = (!self.labels()).then_some(of_values);
         let colours = Colours::Function(Box::new(table));
-        Ok(Arc::new(Prepared { parameters, volume: looked_at, colours, function_of_values, plan }))
+        Ok(Arc::new(Prepared { parameters: self, volume: looked_at, colours, function_of_values, plan }))
     }
 }
 
