@@ -46,9 +46,12 @@ static inline FOUR of_four(FOUR a, FOUR b, FOUR c, FOUR d) {
     return 0.25f * (a * a + b * b + c * c + d * d);
 }
 #if LANES > 1
-static inline float of_blocks(Real upper, Real lower, int inside) {
+// The sum, and in `squares` that of the squares.
+static inline float of_blocks(Real upper, Real lower, int inside, float *squares) {
     HalfReal whole = of_four(upper.even, upper.odd, lower.even, lower.odd);
-    return sum_lanes(select((Real)(0.0f), (Real)(whole, (HalfReal)(0.0f)), MASK(LANE_IDS < inside / 2)));
+    Real blocks = select((Real)(0.0f), (Real)(whole, (HalfReal)(0.0f)), MASK(LANE_IDS < inside / 2));
+    *squares += sum_lanes(blocks * blocks);
+    return sum_lanes(blocks);
 }
 #endif
 
@@ -79,7 +82,7 @@ static inline void of_film(constant Encode *d, global const float *film, global 
     int x0 = block % across * ACROSS, y0 = block / across * 2;
     int rows = min(2, d->height - y0), end = min(x0 + ACROSS, d->width);
     global const float *deviations = film + 4 * d->width * d->height;
-    float scale = 0.0f, blocks = 0.0f, between = 0.0f, pixels = 0.0f, noise_scale = 0.0f;
+    float scale = 0.0f, blocks = 0.0f, block_squares = 0.0f, between = 0.0f, pixels = 0.0f, noise_scale = 0.0f;
     Real luminance = (Real)(0.0f), truncated = luminance, noise = luminance, squares = luminance, weighted = luminance;
     int unknown = 0, clipped = 0;
 #if WHOLE
@@ -109,7 +112,7 @@ static inline void of_film(constant Encode *d, global const float *film, global 
             luminance += l;
             weighted += l * (float)samples;
             float ratio = rescale(&scale, fabs(l));
-            if (ratio != 1.0f) truncated *= ratio, blocks *= ratio, between *= ratio;
+            if (ratio != 1.0f) truncated *= ratio, blocks *= ratio, block_squares *= ratio * ratio, between *= ratio;
             Real through = 1.0f - alpha;
             Real behind = (through > 0.0f ? through : (Real)(0.0f)) * l * inverse(scale);
             truncated += select((Real)(0.0f), behind * behind, MASK(through <= d->ended));
@@ -126,9 +129,12 @@ static inline void of_film(constant Encode *d, global const float *film, global 
         }
         float one = inverse(scale);
 #if LANES == 1
-        if (rows == 2 && (x & 1)) blocks += of_four(before[0][1] * one, light[0] * one, before[1][1] * one, light[1] * one);
+        if (rows == 2 && (x & 1)) {
+            float block = of_four(before[0][1] * one, light[0] * one, before[1][1] * one, light[1] * one);
+            blocks += block, block_squares += block * block;
+        }
 #else
-        if (rows == 2) blocks += of_blocks(light[0] * one, light[1] * one, inside);
+        if (rows == 2) blocks += of_blocks(light[0] * one, light[1] * one, inside, &block_squares);
 #endif
         for (int row = 0; row < rows; row++) between += of_between(light[row], one, x, inside, before[row], &pixels);
     }
@@ -136,6 +142,7 @@ static inline void of_film(constant Encode *d, global const float *film, global 
     sums[SUM_LUMINANCE_SCALE] = scale;
     sums[SUM_TRUNCATED] = sum_lanes(truncated);
     sums[SUM_BLOCKS] = blocks;
+    sums[SUM_BLOCK_SQUARES] = block_squares;
     sums[SUM_BETWEEN] = between;
     sums[SUM_PIXELS_BETWEEN] = pixels;
     sums[SUM_NOISE_SCALE] = noise_scale;

@@ -1,7 +1,9 @@
 //! The film on the host: the samples that a view has gathered so far, its estimated error, and the numbers that are read from its pixels.
 
+mod chance;
 pub mod difference;
 mod estimate;
+mod field;
 mod lowered;
 pub mod picture;
 mod probed;
@@ -11,7 +13,9 @@ mod sums;
 
 use std::sync::Arc;
 
+pub use chance::by_chance;
 pub use estimate::{ErrorEstimate, Source};
+pub use field::FieldError;
 pub use lowered::Lowered;
 use picture::Background;
 pub use probed::{Estimate, ProbePixel, ProbedNoise, ProbedStep, StepPixel};
@@ -137,8 +141,10 @@ pub struct Film {
     pub opacity_threshold: f64,
     /// True if the probe's rays go to their end at other steps, so that its difference has the loss of others' early end.
     pub to_the_end: bool,
-    /// The relative change of the picture since the field had half its histories.
-    pub field_error: Option<f64>,
+    /// True if it shows a field that random work fills.
+    pub has_field: bool,
+    /// The error that the field causes, once it is known.
+    pub field_error: Option<FieldError>,
     /// The background behind the volume.
     pub background: Background,
     /// The quality that was reduced so that the picture came in time.
@@ -165,8 +171,8 @@ pub struct Planned {
 /// The losses of a picture that was reduced to be in time, relative.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Reduced {
-    /// The loss of its longer step.
-    pub step: f64,
+    /// An upper bound of what its step costs, if it is known.
+    pub step: Option<f64>,
     /// The noise of one sample per pixel, if it is known.
     pub noise: Option<f64>,
 }

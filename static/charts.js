@@ -68,14 +68,28 @@ function showPlanner(planner) {
     make('a', { href: href.slice(1), textContent: 'numbers' }));
 }
 
+function showHonesty(honesty) {
+  const { scenes, known, covered, nearly, median, above, asked, within, machines, href, charts } = honesty;
+  const part = (n, of) => `${Number((100 * n / of).toPrecision(3))} %`;
+  const words = `Of ${scenes} random scenes, ${known} have a stated error and a truth that is known well enough. `
+    + `The true error is at most the stated one in ${part(covered, known)} of them, and at most 1.5 times that in ${part(nearly, known)}; the median of stated over true is ${median?.toFixed(2)}, and ${part(above, known)} state more than 4 times too much. `
+    + `Of ${asked} renders that stopped because they had reached the error asked for, ${within} are within it. Measured on ${machines}. `;
+  byId('honesty').replaceChildren(
+    make('h2', { textContent: 'How far can a stated error be trusted?' }),
+    make('p', { textContent: words }),
+    chart(charts[0], 'Stated against true errors'),
+    make('a', { href: href.slice(1), textContent: 'numbers' }));
+}
+
 hooks.askToken = () => Promise.reject(new Problem(401, { title: 'A bearer token is needed: give it in the viewer, in this tab' }));
 
 try {
-  const { studies, stability, planner } = await json('v1/studies');
+  const { studies, stability, planner, honesty } = await json('v1/studies');
   const machine = (studies[0] ?? stability?.experiments[0])?.machine;
   if (machine) byId('device').textContent = `measured on ${machine.processor}, ${machine.threads} threads, ${machine.device}; ${machine.commit}`;
   showCases(studies);
   if (stability) showStability(stability);
+  if (honesty?.known) showHonesty(honesty);
   if (planner) showPlanner(planner);
   if (location.hash) byId(location.hash.slice(1))?.scrollIntoView();
 } catch (error) {

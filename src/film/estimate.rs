@@ -18,7 +18,7 @@ pub struct ErrorEstimate {
     pub resolution: Option<f64>,
     /// The contribution from behind the opacity at which rays end. It is null if a probe has measured it together with the step's.
     pub truncation: Option<f64>,
-    /// The contribution of a field that is still being computed: the change since it had half its histories.
+    /// The standard error by a field of random work: the change of the picture since the field had half of it. It is null if that is not known.
     pub field: Option<f64>,
     /// What the planner's choice leaves out of the scene that was asked for, if it chose.
     pub model: Option<f64>,
@@ -81,13 +81,14 @@ impl Film {
         let rest = [resolution, truncation].into_iter().flatten();
         let own = upper.zip(discretisation).map(|(noise, step)| rest.fold(noise.hypot(step), f64::hypot));
         let relative = |absolute: f64| self.relative(absolute);
+        let of_field = if self.has_field { self.field_error.map(|field| field.bound) } else { Some(0.0) };
         ErrorEstimate {
-            total: own.map(|own| relative(own).hypot(self.field_error.unwrap_or(0.0))),
+            total: own.zip(of_field).map(|(own, of_field)| relative(own).hypot(of_field)),
             noise: expected.or(noise.map(|n| n.value.max(0.0).sqrt())).map(relative),
             discretisation: discretisation.map(relative),
             resolution: resolution.map(relative),
             truncation: truncation.map(relative),
-            field: self.field_error,
+            field: self.field_error.map(|field| field.change),
             ..ErrorEstimate::default()
         }
         .beside(self.planned_now())
@@ -96,7 +97,9 @@ impl Film {
     /// What the planner knows, with its bound if this picture is the planned one.
     fn planned_now(&self) -> Option<Planned> {
         let planned = self.planned?;
-        let is_whole = self.main.stride == 1 && self.lowered.is_none() && self.field_error.is_none();
+        // Pilots that found nothing have not found that nothing is there, either.
+        let is_nothing = self.noisy && self.sums.luminance == 0.0;
+        let is_whole = self.main.stride == 1 && self.lowered.is_none() && !self.has_field && !is_nothing;
         let bound = planned.bound.filter(|_| is_whole && self.main.count >= planned.samples);
         Some(Planned { bound, ..planned })
     }
@@ -142,7 +145,7 @@ impl Film {
             Some(probed) => Some(probed.squared_of(squared)),
             None if !self.noisy => None,
             // The mean of a 2×2 block takes a quarter of random noise away.
-            None if count < 2 => Some(Estimate { value: self.sums.of_blocks().powi(2) * 4.0 / 3.0, error: 0.0 }),
+            None if count < 2 => Some(self.sums.noise_of_blocks()),
             // The squared error of a picture deviates from its own expected value by √(2/ν) of it.
             None => Some(Estimate {
                 value: squared,
@@ -160,7 +163,7 @@ impl Film {
             return Some(0.0);
         }
         match self.reduced {
-            Some(reduced) => Some(self.absolute(reduced.step)),
+            Some(reduced) => reduced.step.map(|step| self.absolute(step)),
             None => self.probed_step.map(|step| step.bound),
         }
     }
@@ -217,9 +220,9 @@ mod tests {
         assert_eq!(biased.error().total, None, "a bias that is not measured");
         let black = Film { noisy: true, stepless: true, sums: Sums::default(), ..film(64, None, None) };
         assert_eq!((black.error().total, black.error().noise), (None, None), "nothing found yet is not nothing there");
-        let reduced = Some(Reduced { step: 0.1, noise: None });
+        let reduced = Some(Reduced { step: Some(0.1), noise: None });
         assert_eq!(Film { reduced, ..film(1, None, None) }.error().total, None);
-        let reduced = Some(Reduced { step: 0.3, noise: Some(0.4) });
+        let reduced = Some(Reduced { step: Some(0.3), noise: Some(0.4) });
         let total = Film { reduced, ..film(1, None, None) }.error().total.unwrap_or(f64::NAN);
         assert!((total - 0.5).abs() < 1e-12, "{total}");
     }

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::{ErrorEstimate, Film, srgb};
+use super::{ErrorEstimate, Film, luminance, srgb};
 use crate::error::Result;
 use crate::frame;
 
@@ -60,6 +60,11 @@ impl Film {
         let known = self.main.stride == 1 && self.main.count >= 2;
         let errors = known.then(|| (0..self.main.m2.len()).map(|i| self.main.squared_error(i).sqrt() as f32).collect());
         frame::exr(self.size, &picture, errors, &self.description(&self.error()))
+    }
+
+    /// The linear luminance of every pixel of the picture's full size, as it is shown.
+    pub fn shown_luminance(&self) -> Vec<f64> {
+        self.rgba().chunks_exact(4).map(luminance).collect()
     }
 
     /// All samples in linear R, G, B (premultiplied) and alpha, row by row from the top. A preview is interpolated to the full size.

@@ -1,5 +1,7 @@
 //! The sums over a film's pixels from which its error is computed. The device works them out (`kernels/encode.cl`).
 
+use super::Estimate;
+
 /// Sums over the samples of a film.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Sums {
@@ -16,6 +18,8 @@ pub struct Sums {
     pub noise_squares: f64,
     /// The sum of the mean squared deviation from the mean of each block of 2 × 2 pixels.
     pub blocks: f64,
+    /// The sum of the squares of these deviations.
+    pub block_squares: f64,
     /// The number of these blocks.
     pub block_count: usize,
     /// The sum of the squared difference of every second pixel of a row to the mean of its neighbours.
@@ -38,6 +42,7 @@ impl std::iter::Sum for Sums {
             noise: a.noise + b.noise,
             noise_squares: a.noise_squares + b.noise_squares,
             blocks: a.blocks + b.blocks,
+            block_squares: a.block_squares + b.block_squares,
             block_count: a.block_count + b.block_count,
             between: a.between + b.between,
             pixels_between: a.pixels_between + b.pixels_between,
@@ -52,6 +57,14 @@ impl Sums {
     /// of this resolution on a picture that is smooth at its scale.
     pub(super) fn of_blocks(&self) -> f64 {
         (self.blocks / self.block_count.max(1) as f64).sqrt()
+    }
+
+    /// The square of random noise, from the deviations within blocks: the mean of a block takes a quarter of it away. The effective number of blocks is
+    /// ν = (Σ b)² / Σ b²; that square, and the squared error of the picture, deviate from it by up to √(2/ν) of it.
+    pub(super) fn noise_of_blocks(&self) -> Estimate {
+        let value = self.of_blocks().powi(2) * 4.0 / 3.0;
+        let part = if self.blocks > 0.0 { (2.0 * self.block_squares).sqrt() / self.blocks } else { 0.0 };
+        Estimate { value, error: value * part }
     }
 
     /// The root mean square of the loss if only every second pixel of every second row is there and the others are interpolated: across for

@@ -177,7 +177,7 @@ const OPERATIONS: &[Operation] = &[
     ),
     get(
         "/v1/studies/{id}",
-        "A study's numbers, or those of `stability`: where methods fail. With .svg after its name, its chart",
+        "A study's numbers, those of `stability`: where methods fail, of `planner` or of `honesty`: whether stated errors hold. With .svg after its name, its chart",
         &[(200, JSON, "The numbers"), (200, "image/svg+xml", "The chart")],
         &[404],
     ),

@@ -10,9 +10,10 @@ use super::App;
 use super::problem::Id;
 use crate::error::{Error, Result};
 use crate::study::CASES;
+use crate::study::honesty::Honesty;
 use crate::study::planner::Planned;
 use crate::study::record::Record;
-use crate::study::results::{PEERS, PLANNER, Results, STABILITY};
+use crate::study::results::{HONESTY, PEERS, PLANNER, Results, STABILITY};
 use crate::study::stability::Stability;
 
 const ROOT: &str = "/v1/studies";
@@ -33,7 +34,8 @@ pub(super) async fn list(State(app): State<App>) -> Result<Json<Value>> {
         let cases: Vec<Value> =
             cases.filter_map(|(name, when, choose)| describe(&name, when, choose, results)).collect();
         json!({"studies": cases, "stability": app.studies.record(STABILITY).as_ref().map(describe_stability),
-            "planner": app.studies.record(PLANNER).as_ref().map(describe_planner)})
+            "planner": app.studies.record(PLANNER).as_ref().map(describe_planner),
+            "honesty": app.studies.record(HONESTY).as_ref().map(describe_honesty)})
     });
     Ok(Json(listed.await.map_err(Error::internal)?))
 }
@@ -64,6 +66,14 @@ fn describe_planner(found: &Planned) -> Value {
     let [error_met, in_time, cheap] = found.figures();
     json!({"href": format!("{ROOT}/{PLANNER}"), "machine": found.machine, "scenes": found.scenes.len(),
         "error_met": error_met, "in_time": in_time, "cheap": cheap})
+}
+
+fn describe_honesty(found: &Honesty) -> Value {
+    let figures = found.figures();
+    let median = Some(figures.median).filter(|median| median.is_finite());
+    json!({"href": format!("{ROOT}/{HONESTY}"), "charts": [format!("{ROOT}/{HONESTY}.svg")], "machines": found.machines(),
+        "scenes": found.scenes().len(), "known": figures.known, "covered": figures.covered, "nearly": figures.nearly,
+        "median": median, "above": figures.above, "asked": figures.asked[0], "within": figures.asked[1]})
 }
 
 /// `GET /v1/studies/{id}`: the numbers of a study. `{id}.svg` is its chart.

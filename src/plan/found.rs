@@ -66,7 +66,7 @@ impl Found {
                 continue;
             }
             let runs = asked.run_two(setting, region, SAMPLES).await?;
-            let scale = found.pilots.first().map_or_else(|| runs[0].mean(), |reference| reference.scale);
+            let scale = found.pilots.first().map_or_else(|| runs[0].scale(), |reference| reference.scale);
             let (bias, bias_within) = match &found.reference {
                 Some([a, b]) if !setting.unbiased => {
                     let apart = |run: &Run, other: &Run, i: usize| (run.luminance(i) - other.luminance(i)) / scale;
@@ -98,7 +98,18 @@ impl Found {
             });
             found.reference.get_or_insert(runs);
         }
+        found.add_the_reference_own();
         if found.pilots.is_empty() { Err(Error::internal("no setting is possible")) } else { Ok(found) }
+    }
+
+    /// Adds to each bias what the reference's own step costs. Let D(h) be the difference between a step of h and the reference's. A method of first order
+    /// has D(2h) = I(h) − I(0) and D(4h) = 3 D(2h); one of second order has a third of that, and D(4h) = 5 D(2h).
+    fn add_the_reference_own(&mut self) {
+        let of = |longer: f64| self.pilots.iter().find(|p| p.setting.longer == Some(longer)).map(|p| p.bias);
+        let Some(twice) = of(2.0).filter(|twice| *twice > 0.0) else { return };
+        let second = of(4.0).map_or(0.0, |four| ((four / twice - 3.0) / 2.0).clamp(0.0, 1.0));
+        let own = twice * (1.0 - second * 2.0 / 3.0);
+        self.pilots.iter_mut().for_each(|pilot| pilot.bias += own);
     }
 
     /// The error of the places in the region that has most of it.
@@ -198,7 +209,7 @@ struct WholePicture {
 
 impl WholePicture {
     fn of([a, b]: &[Run; 2], image: [u32; 2]) -> Self {
-        let scale = a.mean();
+        let scale = a.scale();
         let (random, matter) = random(a.rounds(), b.rounds(), scale);
         let ends = |run: &Run| run.rounds().first().cloned().zip(run.rounds().last().cloned());
         let missed: Vec<f64> = match (ends(a), ends(b)) {

@@ -89,6 +89,8 @@ impl Planner<'_> {
         let target = Target::of(&seen.scene);
         let asked = Asked { planner: self, scene: &seen.scene };
         let Settings { all, ruled_out } = seen.settings(target.error);
+        let steps = seen.view.plan();
+        let is_whole = !steps.biased && (steps.stepless || all.len() > 1);
         let skipped = |(setting, bound, why)| Considered { bias: Some(bound), ..Considered::skipped(&setting, why) };
         let mut considered: Vec<Considered> = ruled_out.into_iter().map(skipped).collect();
         // A setting that is wrong by too much is of no use, unless a time is asked for.
@@ -121,6 +123,7 @@ impl Planner<'_> {
             considered,
             features: seen.features,
             request,
+            is_whole,
         })
     }
 
@@ -201,7 +204,7 @@ impl Planner<'_> {
         }
         let plan = self.plan(&body).await?;
         let request = plan.request.clone();
-        let known = Planned { bound: Some(plan.bound(&body)), samples: plan.samples, bias: plan.bias };
+        let known = Planned { bound: plan.bound(&body), samples: plan.samples, bias: plan.bias };
         let mut words = serde_json::to_value(plan).map_err(Error::internal)?;
         if let Some(words) = words.as_object_mut() {
             words.retain(|name, _| name != "request");

@@ -39,9 +39,10 @@ impl Run {
         mean(self.film.main.mean.chunks_exact(4).map(|p| f64::from(u8::from(p[3] > OPAQUE))))
     }
 
-    /// The mean luminance.
-    pub fn mean(&self) -> f64 {
-        mean((0..self.pixels).map(|i| self.luminance(i))).abs().max(f64::MIN_POSITIVE)
+    /// The mean luminance that errors are relative to; 1 if nothing is seen, since errors are absolute then.
+    pub fn scale(&self) -> f64 {
+        let mean = mean((0..self.pixels).map(|i| self.luminance(i))).abs();
+        if mean > 0.0 { mean } else { 1.0 }
     }
 }
 

@@ -9,7 +9,7 @@ use super::context::DeviceContext;
 use crate::device::grid;
 use crate::device::program::Variant;
 use crate::error::Result;
-use crate::film::Film;
+use crate::film::{FieldError, Film};
 use crate::scene::bounds::Bounds;
 use crate::technique::{AskedField, Field, Look, Process, Step};
 use crate::volume::Volume;
@@ -26,8 +26,8 @@ pub(super) struct FieldRun {
     pub result: Option<Value>,
     /// The picture of half as much work.
     half: Option<Film>,
-    /// The relative change of the picture since the field had half its work.
-    pub error: Option<f64>,
+    /// The error that it causes in the picture.
+    pub error: Option<FieldError>,
     pub device_time: Duration,
 }
 
@@ -90,11 +90,10 @@ impl FieldRun {
         self.half = None;
     }
 
-    /// Compares a picture with the one of half as much work. The difference of a mean to that of its first half has the variance of the mean
-    /// itself, so it estimates the picture's standard error.
+    /// Compares a picture with the one of half as much work.
     pub fn compare_with_half(&mut self, film: Film) {
         if let Some(half) = &self.half {
-            self.error = film.difference(half);
+            self.error = FieldError::of(&film, half);
         }
         self.half = Some(film);
     }

@@ -13,7 +13,7 @@ use crate::device::enums::{Count, DeviceEnum};
 use crate::device::{Buffer, Device};
 use crate::error::Result;
 use crate::film::picture::Background;
-use crate::film::{Film, Lowered, Planned};
+use crate::film::{FieldError, Film, Lowered, Planned};
 use crate::job::SampleCounts;
 use crate::render::Scene;
 use crate::technique::{Random, ViewPlan};
@@ -46,8 +46,9 @@ pub(super) struct Gathered {
     pub rounds: Rounds,
     /// The kernels' counters.
     pub counts: Buffer,
-    /// The relative change of the picture since the field had half its histories.
-    pub field_error: Option<f64>,
+    /// The error that the field causes, if there is a field and it is known.
+    pub field_error: Option<FieldError>,
+    has_field: bool,
     planned: Option<Planned>,
     random: Option<Random>,
     stepless: bool,
@@ -89,7 +90,7 @@ impl Gathered {
         let mut layer = |stride, step, room| Layer::new(device, scene, table(device, step)?, stride, step, 1, room);
         let layers = [layer(sparse, 2.0 * plan.step, of_preview)?, layer(1, plan.step, of_main)?];
         let is_probed = scene.view().random().is_none() && !scene.is_pilot();
-        let probe = || Probe::new(device, scene, steps, |step| table(device, step), of_probe);
+        let probe = || Probe::new(device, scene, steps, plan.cheap, |step| table(device, step), of_probe);
         Ok(Self {
             size,
             layers,
@@ -98,6 +99,7 @@ impl Gathered {
             rounds: Rounds::new(scene.is_pilot()),
             counts: device.upload(&[0; 32], 0)?,
             field_error: None,
+            has_field: scene.subject().field().is_some(),
             random: scene.view().random(),
             planned: scene.planned(),
             stepless: plan.stepless,
@@ -239,6 +241,7 @@ impl Gathered {
             noisy: self.random.is_some(),
             opacity_threshold: self.opacity_threshold,
             to_the_end: self.to_the_end,
+            has_field: self.has_field,
             field_error: self.field_error,
             background: self.background,
             lowered,

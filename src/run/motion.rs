@@ -6,8 +6,9 @@ use super::context::DeviceContext;
 use super::layer::Layer;
 use crate::device::Buffer;
 use crate::error::Result;
-use crate::film::{Film, Lowered, Reduced};
+use crate::film::{FieldError, Film, Lowered, Reduced};
 use crate::render::Scene;
+use crate::scene::camera::Camera;
 
 /// The time of a frame in a smooth motion, ms: the rate of most screens, with room for delays. It applies if it loses no more than [`MOST_LOSS`].
 const SMOOTH_MS: f64 = 16.0;
@@ -59,7 +60,10 @@ pub(super) struct Motion {
     steady: Deadline,
     /// True if the last frame was to be smooth.
     is_smooth: bool,
-    losses: Option<Losses>,
+    /// The losses, and the camera that showed them.
+    losses: Option<(Losses, Camera)>,
+    /// The error that a field causes, as a picture of it has shown.
+    pub field_error: Option<FieldError>,
 }
 
 impl Motion {
@@ -69,6 +73,7 @@ impl Motion {
             steady: Deadline::new(STEADY_MS, STEADY_DEVICE_MS),
             is_smooth: true,
             losses: None,
+            field_error: None,
         }
     }
 
@@ -83,26 +88,30 @@ impl Motion {
     }
 
     /// Learns the losses from a picture of a single sample per pixel. With more samples, the places within steps would average out the step's loss.
-    pub fn see(&mut self, film: &Film) {
-        self.losses = Losses::of(film).or(self.losses);
+    pub fn see(&mut self, film: &Film, camera: &Camera) {
+        self.losses = Losses::of(film).map(|losses| (losses, *camera)).or(self.losses);
     }
 
-    /// The reduction of a picture of `rays` rays that take `ray_ms` each, and the loss of its longer step. It loses the least of all reductions
-    /// that are in time; nothing is reduced if the whole picture is in time. Unknown losses are taken to be equal.
-    pub fn least(&mut self, rays: f64, ray_ms: f64, stepless: bool) -> (Lowered, Reduced) {
+    /// The reduction of a picture of `rays` rays that take `ray_ms` each by a camera, and the loss of its longer step. It loses the least of all reductions
+    /// that are in time; nothing is reduced if the whole picture is in time. Unknown losses are taken to be equal. From far away, what another camera has
+    /// shown chooses, but is not stated.
+    pub fn least(&mut self, rays: f64, ray_ms: f64, stepless: bool, camera: &Camera) -> (Lowered, Reduced) {
         self.is_smooth = true;
         if rays * ray_ms <= self.smooth.device_ms {
-            return (Lowered::default(), Reduced { step: 0.0, noise: None });
+            return (Lowered::default(), Reduced::default());
         }
-        let unknown = Losses { resolution: 1.0, step: (!stepless).then_some(1.0), noise: None };
-        let losses = self.losses.unwrap_or(unknown);
+        let unknown = Losses { resolution: 1.0, step: (!stepless).then_some(1.0), own: None, noise: None };
+        let is_near = self.losses.is_some_and(|(_, of)| of.is_near(camera));
+        let losses = self.losses.map_or(unknown, |(losses, _)| losses);
         let mut lowered = losses.least(rays, ray_ms, self.smooth.device_ms);
         self.is_smooth =
             losses.of_lowered(lowered) <= MOST_LOSS && rays * ray_ms * lowered.cost() <= self.smooth.device_ms;
         if !self.is_smooth {
             lowered = losses.least(rays, ray_ms, self.steady.device_ms);
         }
-        (lowered, Reduced { step: losses.of_step(lowered.step), noise: losses.noise })
+        let known = if stepless { Some(0.0) } else { losses.own.filter(|_| is_near) };
+        let step = known.map(|own| own + losses.of_step(lowered.step));
+        (lowered, Reduced { step, noise: losses.noise.filter(|_| is_near) })
     }
 }
 
@@ -121,6 +130,8 @@ struct Losses {
     resolution: f64,
     /// The loss of twice the step; `None` if the step plays no part.
     step: Option<f64>,
+    /// What the step itself costs, if it is known.
+    own: Option<f64>,
     /// The noise of one sample per pixel, if it is known.
     noise: Option<f64>,
 }
@@ -129,8 +140,9 @@ impl Losses {
     /// The losses that a whole picture of a single sample per pixel shows.
     fn of(film: &Film) -> Option<Self> {
         let is_whole = film.main.count == 1 && film.lowered.is_none();
-        let noise = film.error().noise;
-        is_whole.then(|| Self { resolution: film.resolution_loss(), step: film.step_loss_seen(), noise })
+        let (step, error) = (film.step_loss_seen(), film.error());
+        let losses = Self { resolution: film.resolution_loss(), step, own: error.discretisation, noise: error.noise };
+        is_whole.then_some(losses)
     }
 
     /// The loss of a reduction. The loss of resolution is taken to come from edges, and grows with the stride.
@@ -200,53 +212,70 @@ impl Moving {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
+    use crate::request::CameraRequest;
+    use crate::scene::bounds::Bounds;
 
     #[test]
     fn what_matters_least_is_lowered_and_no_more_than_need_be() {
-        let losses = Losses { resolution: 0.02, step: Some(0.001), noise: None };
+        let losses = Losses { resolution: 0.02, step: Some(0.001), own: Some(0.0), noise: None };
         // 100 rays of 1 ms have 40 ms: a step of four times leaves 38 ms and loses 0.5 %.
         assert_eq!(losses.least(100.0, 1.0, 40.0), Lowered { stride: 1, step: 4.0 });
         assert_eq!(losses.least(100.0, 0.2, 30.0), Lowered { stride: 1, step: 1.0 });
         // Every second pixel loses 2 %, and a longer step 10 % and more.
-        let rough = Losses { resolution: 0.02, step: Some(0.1), noise: None };
+        let rough = Losses { resolution: 0.02, step: Some(0.1), own: Some(0.0), noise: None };
         assert_eq!(rough.least(100.0, 1.0, 40.0), Lowered { stride: 2, step: 1.0 });
-        let stepless = Losses { resolution: 0.02, step: None, noise: None };
+        let stepless = Losses { resolution: 0.02, step: None, own: Some(0.0), noise: None };
         assert_eq!(stepless.least(200.0, 1.0, 30.0), Lowered { stride: 4, step: 1.0 });
         // No reduction is in time, so the cheapest one is taken.
         assert_eq!(losses.least(1e9, 1.0, 30.0), Lowered { stride: MOST_STRIDE, step: 4.0 });
     }
 
+    /// A camera that has turned by some degrees around a box.
+    fn from(degrees: f64) -> Camera {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let request = CameraRequest { eye: Some([4.0 * sin, 0.0, 4.0 * cos]), ..CameraRequest::default() };
+        let bounds = Bounds::of_corners(DVec3::splat(-1.0), DVec3::ONE);
+        Camera::from_request(Some(&request), &bounds).expect("a camera")
+    }
+
     /// A motion that knows its losses.
     fn motion(losses: Losses) -> Motion {
-        Motion { losses: Some(losses), ..Motion::new() }
+        Motion { losses: Some((losses, from(0.0))), ..Motion::new() }
     }
 
     #[test]
     fn frames_that_come_late_leave_the_device_less() {
-        let mut motion = motion(Losses { resolution: 0.001, step: None, noise: None });
-        let first = motion.least(1e6, 1e-4, true).0;
+        let mut motion = motion(Losses { resolution: 0.001, step: None, own: Some(0.0), noise: None });
+        let first = motion.least(1e6, 1e-4, true, &from(0.0)).0;
         (0..5).for_each(|_| motion.learn(90.0));
-        assert!(motion.least(1e6, 1e-4, true).0.stride > first.stride);
+        assert!(motion.least(1e6, 1e-4, true, &from(0.0)).0.stride > first.stride);
         (0..100).for_each(|_| motion.learn(5.0));
-        assert!(motion.least(1e6, 1e-4, true).0.stride <= first.stride);
-        assert!(motion.least(1e4, 1e-4, true).0.is_none(), "what is in time as it is stays as it is");
+        assert!(motion.least(1e6, 1e-4, true, &from(0.0)).0.stride <= first.stride);
+        assert!(motion.least(1e4, 1e-4, true, &from(0.0)).0.is_none(), "what is in time as it is stays as it is");
     }
 
     #[test]
     fn a_motion_is_smooth_where_little_is_lost_and_else_steady() {
         // 30 ms of rays have 13 ms: a step of four times is in time.
-        let mut gentle = motion(Losses { resolution: 0.5, step: Some(0.01), noise: None });
-        let (lowered, losses) = gentle.least(3e5, 1e-4, false);
+        let mut gentle = motion(Losses { resolution: 0.5, step: Some(0.01), own: Some(0.0), noise: None });
+        let (lowered, losses) = gentle.least(3e5, 1e-4, false, &from(0.0));
         assert_eq!(lowered, Lowered { stride: 1, step: 4.0 });
-        assert!((losses.step - 0.05).abs() < 1e-12);
+        assert!((losses.step.unwrap_or(0.0) - 0.05).abs() < 1e-12);
+        let far = gentle.least(3e5, 1e-4, false, &from(40.0));
+        assert_eq!(far, (lowered, Reduced::default()), "what another camera has shown is not stated");
         assert!(gentle.is_smooth);
         // A step of twice would bring 20 ms of rays in time, but lose 20 %. So the whole picture is rendered, 30 times per second.
-        let mut rough = motion(Losses { resolution: 0.5, step: Some(0.2), noise: None });
-        assert_eq!(rough.least(2e5, 1e-4, false), (Lowered::default(), Reduced { step: 0.0, noise: None }));
+        let mut rough = motion(Losses { resolution: 0.5, step: Some(0.2), own: Some(0.0), noise: None });
+        assert_eq!(
+            rough.least(2e5, 1e-4, false, &from(0.0)),
+            (Lowered::default(), Reduced { step: Some(0.0), noise: None })
+        );
         assert!(!rough.is_smooth);
         // Unknown losses are not risked either.
         let mut unknown = Motion::new();
-        assert_eq!(unknown.least(2e5, 1e-4, false).0, Lowered::default());
+        assert_eq!(unknown.least(2e5, 1e-4, false, &from(0.0)).0, Lowered::default());
     }
 }

@@ -18,6 +18,8 @@ use sets::{FINE, KINDS, MOST, MOST_FOR_STEP, QUICK_KINDS, SAME, Set, Step, TWICE
 /// The pixels of a probe along the picture's shorter side, if that has at least so many pixels, or fewer.
 const ALONG: [usize; 2] = [32, 20];
 const LARGE: usize = 400;
+/// The same if a sample costs little.
+const ALONG_CHEAP: usize = 96;
 /// The least shorter side of which every second cluster of these judges the step.
 const SPARSE_FROM: usize = 200;
 /// Pixels lie in clusters of two by two. With the samples of a pass they fill a beam of rays that lie close together.
@@ -55,13 +57,15 @@ impl Probe {
         device: &Device,
         scene: &Scene,
         steps: Steps,
+        cheap: bool,
         mut table: impl FnMut(f32) -> Result<Rc<Buffer>>,
         room: Option<Buffer>,
     ) -> Result<Self> {
         let region = scene.region();
         let shorter = region.size[0].min(region.size[1]) as usize / region.stride as usize;
         let cluster = if shorter > 1 { CLUSTER } else { 0 };
-        let stride = (shorter / ALONG[usize::from(shorter < LARGE)]).max(1) << cluster;
+        let along = if cheap { ALONG_CHEAP } else { ALONG[usize::from(shorter < LARGE)] };
+        let stride = (shorter / along).max(1) << cluster;
         let films = (MOST as usize) << (2 * cluster);
         let layer = Layer::new(device, scene, table(steps.step)?, stride, steps.step, films, room)?;
         let mut probe = Self {

@@ -224,7 +224,7 @@ impl ViewRun {
     pub fn hurry(&mut self, context: &DeviceContext, motion: &mut Motion) -> Result<()> {
         let rays = (self.gathered.size[0] * self.gathered.size[1]) as f64;
         let ray_ms = self.ray_ms.or_else(|| context.speed(&self.plan.variant).map(f64::recip));
-        let known = ray_ms.map(|ray_ms| motion.least(rays, ray_ms, self.plan.stepless));
+        let known = ray_ms.map(|ray_ms| motion.least(rays, ray_ms, self.plan.stepless, self.scene.camera()));
         let (lowered, losses) = known.unwrap_or_default();
         let step = self.plan.step;
         self.gathered.will_change();

@@ -73,7 +73,7 @@ impl Live {
             self.learn_losses(context)?;
         }
         let Some(view) = &mut self.view else { return Ok(Turn::Over) };
-        view.gathered.field_error = self.field.as_ref().and_then(|f| f.error);
+        view.gathered.field_error = self.motion.field_error;
         match next(view, self.started, context)? {
             Next::GoOn => self.frame_if_due(context, Pass::Main),
             Next::Refine => view.halve_step(context).map(|()| Turn::Again),
@@ -92,7 +92,8 @@ impl Live {
     /// Learns the losses of a lower resolution and of a longer step, for the time when the camera moves.
     fn learn_losses(&mut self, context: &DeviceContext) -> Result<()> {
         if let (Some(view), true) = (&mut self.view, self.job.is_followed()) {
-            self.motion.see(&view.gathered.encode(context)?);
+            let film = view.gathered.encode(context)?;
+            self.motion.see(&film, view.scene().camera());
         }
         Ok(())
     }
@@ -115,7 +116,10 @@ impl Live {
     /// field's noise is, and are not compared.
     fn compare_with_half(&mut self, context: &DeviceContext) -> Result<()> {
         match (&mut self.field, &mut self.view) {
-            (Some(field), Some(view)) if !view.is_random() => field.compare_with_half(view.gathered.film(context)?),
+            (Some(field), Some(view)) if !view.is_random() => {
+                field.compare_with_half(view.gathered.film(context)?);
+                self.motion.field_error = field.error;
+            }
             _ => {}
         }
         Ok(())
@@ -124,7 +128,7 @@ impl Live {
     fn leave_snapshot(&mut self, context: &DeviceContext, stopped_by: Option<&'static str>) -> Result<()> {
         let (Some(view), Some(camera)) = (&mut self.view, &self.camera) else { return Ok(()) };
         let field = self.field.as_ref();
-        view.gathered.field_error = field.and_then(|f| f.error);
+        view.gathered.field_error = self.motion.field_error;
         let film = view.gathered.encode(context)?;
         let device_time = self.earlier_time + view.device_time + field.map_or(Duration::ZERO, |f| f.device_time);
         self.job.leave_snapshot(Snapshot {

@@ -117,6 +117,15 @@ impl Camera {
         })
     }
 
+    /// True if what another camera sees is much alike: it looks in a direction less than 15° away, from less than a quarter of the distance to the
+    /// target away, with much the same angle.
+    pub fn is_near(&self, other: &Self) -> bool {
+        let (turn, way) = (self.forward.dot(other.forward), self.eye.distance(other.eye));
+        let angle = self.fov_y_deg / other.fov_y_deg;
+        let alike = self.perspective == other.perspective && (0.8..1.25).contains(&angle);
+        alike && turn > 15f64.to_radians().cos() && way < 0.25 * self.eye.distance(self.target)
+    }
+
     /// The unit vector from the scene towards the eye, from which a headlight shines.
     pub fn towards_eye(&self) -> DVec3 {
         -self.forward

@@ -8,7 +8,7 @@ use tokio::runtime::Handle;
 use crate::asset::Assets;
 use crate::config::{DeviceArgs, Limits};
 use crate::device::DeviceInfo;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::job::Job;
 use crate::plan::Plan;
@@ -115,6 +115,26 @@ impl Bench {
     /// [`crate::error::Error::NotFound`] if it is not kept any more.
     pub fn film(&self, job: &Arc<Job>) -> Result<Arc<Film>> {
         self.handle.block_on(self.service.engine().film(job))
+    }
+
+    /// The first film of a request that somebody watches, before the render has ended; or the first film of another camera after its end. The
+    /// render is cancelled then.
+    ///
+    /// # Errors
+    /// As [`Bench::finish`].
+    pub fn glimpse(&self, request: &Value, moved: Option<&Value>) -> Result<Arc<Film>> {
+        let engine = self.service.engine();
+        self.handle.block_on(async {
+            let job = self.service.submit(request.clone()).await?;
+            job.set_followed(true);
+            if let Some(camera) = moved {
+                job.watch().wait_for(|u| u.state.is_terminal()).await.map_err(Error::internal)?;
+                engine.set_camera(&job, job.camera_from_json(camera)?)?;
+            }
+            let film = engine.film(&job).await;
+            engine.cancel(&job);
+            film
+        })
     }
 
     /// Plans a request.

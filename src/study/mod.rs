@@ -27,6 +27,7 @@ mod table;
 pub mod verdict;
 
 pub use cases::CASES;
+use run::field_of;
 pub use run::{ERRORS, machine, study};
 pub use table::table;
 

@@ -119,18 +119,17 @@ impl Results {
         Ok(found)
     }
 
-    /// Puts the outcomes of the study of stated errors and their page in the folder, beside those of other scenes from the same program on the same
-    /// machine. Returns all of them.
+    /// Puts the outcomes of the study of stated errors, their chart and their page in the folder, beside those of other scenes from the same program.
     ///
     /// # Errors
     /// As [`Results::put`].
-    pub fn put_honesty(&self, mut found: Honesty) -> Result<Honesty> {
-        if let Some(old) = self.record::<Honesty>(HONESTY).filter(|old| old.machine.is_same(&found.machine)) {
-            join(&mut found.scenes, old.scenes, |outcome| outcome.scene);
+    pub fn put_honesty(&self, mut found: Honesty) -> Result<()> {
+        if let Some(old) = self.record::<Honesty>(HONESTY) {
+            found.keep(old);
         }
-        self.write("honesty.json", &json(&found)?)?;
-        self.write("honesty.md", &found.page())?;
-        Ok(found)
+        self.write("honesty.json", &found.lines()?)?;
+        self.write("honesty.svg", &draw::honesty(&found)?)?;
+        self.write("honesty.md", &found.page())
     }
 
     fn write(&self, file: &str, text: &str) -> Result<()> {

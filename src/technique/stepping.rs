@@ -30,23 +30,33 @@ impl<P: Clone> Way<P> {
 }
 
 /// The settings of a view that samples along its rays: steps, at the volume's levels, in each of some `ways`. `with_step` gives a way's parameters a
-/// step in sides of the smallest voxel. `None` if the request gives the step.
+/// step in sides of the smallest voxel. The reference is the way without steps, if there is one, or else the shortest step. `None` if the request
+/// gives the step.
 pub(super) fn stepping<P>(
     technique: &'static str,
     open: &Open<'_>,
     ways: &[Way<P>],
+    without_steps: Option<Way<P>>,
     with_step: impl Fn(&P, f64) -> Arc<dyn View>,
 ) -> Option<Settings> {
     let as_given = &ways.first().filter(|_| open.leaves("step_voxels"))?.parameters;
     let of_step = |step: f64| vec![("step_voxels", json!(step))];
-    let mut all = vec![Setting {
-        view: Some(with_step(as_given, SHORTEST)),
-        changes: of_step(SHORTEST),
-        ..Setting::as_given(technique, format!("{technique}, the shortest step"))
+    let has_steps = without_steps.is_none();
+    let mut all = vec![match without_steps {
+        Some(Way { words, change, parameters }) => Setting {
+            view: Some(with_step(&parameters, SHORTEST)),
+            changes: change.into_iter().collect(),
+            ..Setting::as_given(technique, format!("{technique}{words}"))
+        },
+        None => Setting {
+            view: Some(with_step(as_given, SHORTEST)),
+            changes: of_step(SHORTEST),
+            ..Setting::as_given(technique, format!("{technique}, the shortest step"))
+        },
     }];
     let coarser = open.levels.iter().map(|level| (Some(*level), &COARSER_STEPS[..]));
     let levels: Vec<_> = [(None, &STEPS[..])].into_iter().chain(coarser).collect();
-    for Way { words: way, change, parameters } in ways {
+    for (place, Way { words: way, change, parameters }) in ways.iter().enumerate() {
         let mut finer: Option<String> = None;
         for (level, steps) in &levels {
             // All that the next finer level leaves out with its shortest step is left out here as well.
@@ -59,6 +69,7 @@ pub(super) fn stepping<P>(
                     changes: of_step(step).into_iter().chain(change.clone()).collect(),
                     level: *level,
                     unbiased: false,
+                    longer: (has_steps && place == 0 && level.is_none()).then(|| step / SHORTEST),
                     less: less.replace(words.clone()).into_iter().collect(),
                     ..Setting::as_given(technique, words)
                 });

@@ -42,6 +42,8 @@ pub struct ViewPlan {
     pub state_words: usize,
     /// True if the step has no effect on the picture.
     pub stepless: bool,
+    /// True if a sample costs so little that most of the picture's pixels are sampled again to find its error.
+    pub cheap: bool,
     /// True if the method has an error besides noise that is not measured.
     pub biased: bool,
     /// The opacity at which a ray ends. The light behind is part of the error.
@@ -174,6 +176,8 @@ pub struct Setting {
     pub words: String,
     /// True if its error falls to 0 with more samples.
     pub unbiased: bool,
+    /// Its step as a multiple of the reference's, if it differs from the reference in nothing else.
+    pub longer: Option<f64>,
     /// The words of the settings that leave out less. If one of them leaves out too much, so does this one.
     pub less: Vec<String>,
 }
@@ -182,7 +186,7 @@ impl Setting {
     /// The view of the scene as it is. It stands for the truth.
     pub fn as_given(technique: &'static str, words: String) -> Self {
         let (changes, without_lights, less) = (Vec::new(), Vec::new(), Vec::new());
-        Self { technique, view: None, changes, without_lights, level: None, words, unbiased: true, less }
+        Self { technique, view: None, changes, without_lights, level: None, words, unbiased: true, longer: None, less }
     }
 }
 

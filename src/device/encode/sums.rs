@@ -15,6 +15,8 @@ device_enum! {
         Truncated,
         /// Squared deviations of blocks of four pixels from their means.
         Blocks,
+        /// Squares of these.
+        BlockSquares,
         /// Squared differences between pixels and the mean of their neighbours.
         Between,
         /// The number of pixels in `Between`.
@@ -45,6 +47,7 @@ pub fn sums_of_block(numbers: &[f32; SUMS]) -> Sums {
         luminance: of(FilmSum::Luminance),
         truncated: of(FilmSum::Truncated) * scale * scale,
         blocks: of(FilmSum::Blocks) * scale * scale,
+        block_squares: of(FilmSum::BlockSquares) * scale.powi(4),
         between: of(FilmSum::Between) * scale * scale,
         pixels_between: of(FilmSum::PixelsBetween) as u64,
         noise: of(FilmSum::Noise),

@@ -2,10 +2,12 @@
 
 mod heat;
 mod lines;
+mod scatter;
 mod sweep;
 
 pub use heat::heat_map;
 pub use lines::study;
+pub use scatter::honesty;
 pub use sweep::sweep;
 
 use plotters::style::RGBColor;

@@ -1,18 +1,25 @@
-//! Random scenes: any view with parameters that it draws itself, on volumes of any type, of any size of picture, with any budget.
+//! Random scenes: any view with parameters that it draws itself, on volumes of any type and on fields, of any size of picture, with any budget, at any
+//! moment.
 
+use glam::DVec3;
 use serde_json::{Value, json};
 
+use super::moment::Moment;
+use super::subject::Subject;
 use crate::error::Result;
 use crate::study::bench::Bench;
 use crate::study::oracle::Random;
 use crate::technique::{self, Draw, Technique};
-use crate::volume::builtin::BUILTINS;
-use crate::volume::{RawQuery, VoxelType, Voxels};
 
 /// The draws until one is a valid request.
 const TRIES: u64 = 50;
 /// The technique that stands for the planner's choice.
 const AUTO: &str = "auto";
+/// The part of the scenes that look at a field.
+const FIELDS: f64 = 0.1;
+/// The parts of the scenes that are judged at their first picture, and after a motion.
+const FIRST: f64 = 0.1;
+const MOVED: f64 = 0.1;
 
 /// A scene of the study.
 #[derive(Debug, Clone)]
@@ -21,6 +28,8 @@ pub struct Scene {
     pub technique: &'static str,
     /// The request.
     pub request: Value,
+    /// The moment at which it is judged.
+    pub moment: Moment,
     /// The request without a budget whose picture is the truth. It has no size and no seed yet.
     pub truth: Value,
 }
@@ -39,14 +48,37 @@ pub fn scene(bench: &Bench, number: u64, sizes: &[u32]) -> Result<Option<Scene>>
             None => views[(random.unit() * views.len() as f64) as usize],
         };
         let scene = draw(bench, view, turn == views.len(), number, &mut random, sizes)?;
-        // The planner's request is one of its view too.
-        let mut own = scene.request.clone();
-        own["technique"] = scene.truth["technique"].clone();
-        if bench.is_valid(&own) && bench.is_valid(&scene.truth) {
+        if (scene.technique == AUTO || bench.is_valid(&scene.request)) && bench.is_valid(&scene.truth) {
             return Ok(Some(scene));
         }
     }
     Ok(None)
+}
+
+impl Scene {
+    /// The options that it has, each with its value if that is a word or a truth value; the kind of its subject, and its budget.
+    pub fn options(&self) -> Vec<String> {
+        let views = technique::views().filter_map(|t| Some((t.name, self.request.get(t.name)?.as_object()?)));
+        let own = views.flat_map(|(name, own)| own.iter().map(move |(field, value)| (name, field, value)));
+        let mut options: Vec<String> = own
+            .map(|(name, field, value)| match value {
+                Value::String(word) => format!("`{name}`: {field} {word}"),
+                Value::Bool(truth) => format!("`{name}`: {field} {truth}"),
+                _ => format!("`{name}`: {field}"),
+            })
+            .collect();
+        let volume = &self.request["volume"];
+        let kinds = [("builtin", "a built-in"), ("id", "an upload")];
+        let kind = kinds.into_iter().find(|(key, _)| volume.get(key).is_some()).map_or("a field", |(_, words)| words);
+        options.push(format!("subject: {kind}"));
+        let budget = &self.request["budget"];
+        options.push(match budget["samples"].as_u64() {
+            Some(samples) => format!("budget: {samples} samples"),
+            None if budget.get("max_error").is_some() => "budget: max_error".into(),
+            None => "budget: time_ms".into(),
+        });
+        options
+    }
 }
 
 fn draw(
@@ -58,36 +90,54 @@ fn draw(
     sizes: &[u32],
 ) -> Result<Scene> {
     let mut unit = || random.unit();
-    let (volume, range) = volume(bench, number, &mut unit)?;
+    let subject =
+        if unit() < FIELDS { Subject::field(bench, &mut unit)? } else { Subject::volume(bench, number, &mut unit)? };
     let cases = (view.cases)();
-    let mut own = (cases.draw)(&mut Draw::new(&mut unit, range, 2.0));
+    let mut own = (cases.draw)(&mut Draw::new(&mut unit, subject.range, subject.side));
     let size = |unit: &mut dyn FnMut() -> f64| sizes[(unit() * sizes.len() as f64) as usize];
     let image = json!({"width": size(&mut unit), "height": size(&mut unit)});
-    let mut request = json!({"technique": view.name, view.name: own, "volume": volume, "image": image, "seed": number,
-        "camera": camera(&mut unit)});
+    let mut request =
+        json!({"technique": view.name, view.name: own, "volume": subject.volume, "image": image, "seed": number});
+    request["camera"] = camera(&mut unit, &subject);
     if unit() < 0.1 {
-        request["clip"] =
-            json!({"planes": [{"normal": [unit() - 0.5, unit() - 0.5, unit() - 0.5], "point": [0.2 * unit(), 0, 0]}]});
+        let normal: [f64; 3] = std::array::from_fn(|_| unit() - 0.5);
+        let point = subject.centre + 0.1 * subject.side * unit() * DVec3::X;
+        request["clip"] = json!({"planes": [{"normal": normal, "point": point.to_array()}]});
     }
+    let moment = match unit() {
+        _ if is_planned => Moment::End,
+        part if part < FIRST => Moment::First,
+        part if part < FIRST + MOVED => Moment::Moved(camera(&mut unit, &subject)),
+        _ => Moment::End,
+    };
     let mut truth = request.clone();
-    if let Some(own) = own.as_object_mut() {
-        (cases.truth)(own);
-        truth[view.name] = json!(own);
+    if let Moment::Moved(camera) = &moment {
+        truth["camera"] = camera.clone();
+    }
+    // The planner leaves nothing of the scene out.
+    let whole = technique::views().find(|t| is_planned && t.name == view.complete()).unwrap_or(view);
+    if let (Some(all), Some(own)) = (truth.as_object_mut(), own.as_object_mut()) {
+        all.remove(view.name);
+        ((whole.cases)().truth)(own);
+        all.insert(whole.name.into(), json!(own));
+        all.insert("technique".into(), json!(whole.name));
     }
     request["budget"] = budget(&mut unit, is_planned);
     if is_planned {
         request["technique"] = json!(AUTO);
     }
-    Ok(Scene { technique: if is_planned { AUTO } else { view.name }, request, truth })
+    Ok(Scene { technique: if is_planned { AUTO } else { view.name }, request, moment, truth })
 }
 
-/// A camera around the volume, now and then inside of it or without perspective.
-fn camera(unit: &mut dyn FnMut() -> f64) -> Value {
+/// A camera around a subject, now and then inside of it or without perspective.
+fn camera(unit: &mut dyn FnMut() -> f64, subject: &Subject) -> Value {
+    let half = 0.5 * subject.side;
     let (turn, height) = (std::f64::consts::TAU * unit(), 2.0 * unit() - 1.0);
     let flat = (1.0 - height * height).sqrt();
-    let far = if unit() < 0.1 { 0.3 + 0.7 * unit() } else { 2.0 + 2.0 * unit() };
-    let target: [f64; 3] = std::array::from_fn(|_| 0.4 * (unit() - 0.5));
-    json!({"eye": [far * flat * turn.cos(), far * height, far * flat * turn.sin()], "target": target, "up": [0.1, 0.2, 1],
+    let far = half * if unit() < 0.1 { 0.3 + 0.7 * unit() } else { 2.0 + 2.0 * unit() };
+    let eye = subject.centre + far * DVec3::new(flat * turn.cos(), height, flat * turn.sin());
+    let target = subject.centre + 0.4 * half * DVec3::from_array(std::array::from_fn(|_| unit() - 0.5));
+    json!({"eye": eye.to_array(), "target": target.to_array(), "up": [0.1, 0.2, 1],
         "fov_y_deg": 20.0 + 45.0 * unit(), "projection": if unit() < 0.15 { "orthographic" } else { "perspective" }})
 }
 
@@ -103,36 +153,4 @@ fn budget(unit: &mut dyn FnMut() -> f64, is_planned: bool) -> Value {
     } else {
         json!({"time_ms": logarithmic(unit(), 10.0, 300.0).round()})
     }
-}
-
-/// A built-in volume as it is, or its values in another type of voxels, and its range.
-fn volume(bench: &Bench, number: u64, unit: &mut dyn FnMut() -> f64) -> Result<(Value, [f64; 2])> {
-    let builtin = &BUILTINS[(unit() * BUILTINS.len() as f64) as usize];
-    let resolution = [16, 24, 32, 48, 64, 96][(unit() * 6.0) as usize];
-    let values = bench.assets().builtin(builtin.name, resolution, number)?;
-    let voxel = VoxelType::ALL[(unit() * 4.0) as usize];
-    if unit() < 0.5 || voxel == VoxelType::F32 {
-        return Ok((json!({"builtin": builtin.name, "resolution": resolution, "seed": number}), values.range()));
-    }
-    let most = match voxel {
-        VoxelType::U8 => f64::from(u8::MAX),
-        VoxelType::I16 => f64::from(i16::MAX),
-        VoxelType::U16 | VoxelType::F32 => f64::from(u16::MAX),
-    };
-    let ([low, high], floats) = (values.range(), values.values()?);
-    let whole = |i: usize| (most * (floats.of(i) - low) / (high - low).max(f64::MIN_POSITIVE)).round();
-    let all = 0..values.voxel_count();
-    let voxels = match voxel {
-        VoxelType::U8 => Voxels::U8(all.map(|i| whole(i) as u8).collect()),
-        VoxelType::I16 => Voxels::I16(all.map(|i| whole(i) as i16).collect()),
-        VoxelType::U16 | VoxelType::F32 => Voxels::U16(all.map(|i| whole(i) as u16).collect()),
-    };
-    let query = RawQuery {
-        dims: Some(values.dims().map(|n| n.to_string()).join(",")),
-        r#type: Some(format!("{voxel:?}").to_lowercase()),
-        spacing: Some(values.spacing().map(|s| s.to_string()).join(",")),
-        endian: None,
-    };
-    let (stored, id, _) = bench.assets().volumes().insert(voxels.as_bytes().to_vec(), "honesty", query.parse()?)?;
-    Ok((json!({ "id": id }), stored.range()))
 }

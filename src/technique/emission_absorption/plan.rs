@@ -107,6 +107,7 @@ impl Parameters {
             step: (self.step_voxels * volume.smallest_side()) as f32,
             state_words: STATE_WORDS,
             stepless: false,
+            cheap: false,
             biased: false,
             opacity_threshold: self.threshold(),
             reasons,
@@ -214,7 +215,7 @@ impl PreparedView for Prepared {
             let unshaded = Parameters { shading: false, ..given.clone() };
             ways.push(Way { words: ", unshaded", change: Some(("shading", json!(false))), parameters: unshaded });
         }
-        stepping(TECHNIQUE.name, open, &ways, |p, step| Arc::new(Parameters { step_voxels: step, ..p.clone() }))
+        stepping(TECHNIQUE.name, open, &ways, None, |p, step| Arc::new(Parameters { step_voxels: step, ..p.clone() }))
     }
 
     fn steepest_slope(&self) -> Option<f64> {

@@ -127,6 +127,7 @@ impl View for Parameters {
             step: (self.step_voxels * smallest) as f32,
             state_words: STATE_WORDS,
             stepless: false,
+            cheap: false,
             biased: false,
             opacity_threshold: if self.layered(&surfaces) { OPACITY_THRESHOLD } else { 1.0 },
             reasons,
@@ -146,7 +147,7 @@ impl PreparedView for Prepared {
 
     fn settings(&self, open: &Open<'_>) -> Option<Settings> {
         let ways = [Way::as_given(&self.parameters)];
-        stepping(TECHNIQUE.name, open, &ways, |p, step| Arc::new(Parameters { step_voxels: step, ..p.clone() }))
+        stepping(TECHNIQUE.name, open, &ways, None, |p, step| Arc::new(Parameters { step_voxels: step, ..p.clone() }))
     }
 
     fn parameters(&self, _camera: &Camera) -> Vec<u8> {

@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 
 use super::TECHNIQUE;
 use crate::technique::case::{Case, Cases};
+use crate::technique::draw::Draw;
 
 pub(super) fn cases() -> Cases {
     let light = json!({"mu_a_per_mm": 1, "mu_s_per_mm": 9});
@@ -17,7 +18,31 @@ pub(super) fn cases() -> Cases {
             }));
         }
     }
-    Cases { all, tiny: tiny(), ..Cases::default() }
+    Cases { all, tiny: tiny(), draw, ..Cases::default() }
+}
+
+/// The chamber, a cube of one medium, or a cloud: a field at random. The cube has the default side.
+fn draw(draw: &mut Draw<'_>) -> Value {
+    let mut own = json!({"photons": draw.logarithmic(2e4, 2e5).round(), "seed": draw.between(0.0, 1e6).round()});
+    let (absorption, scattering) = (draw.extinction(0.1, 3.0), draw.extinction(2.0, 40.0));
+    let phase = json!({"type": "henyey_greenstein", "g": draw.between(0.0, 0.9)});
+    match draw.one_of(&["chamber", "cube", "cloud"]) {
+        "cube" => own["medium"] = json!({"mu_a_per_mm": absorption, "mu_s_per_mm": scattering, "phase": phase}),
+        "cloud" => {
+            own["density"] = json!({"builtin": draw.one_of(&["smoke", "gaussian"]), "resolution": 32});
+            // A built-in has a side of 2.
+            own["medium"] = json!({"mu_a_per_mm": 30.0 * absorption, "mu_s_per_mm": 30.0 * scattering, "phase": phase});
+        }
+        _ => own["albedo"] = json!(draw.between(0.3, 0.95)),
+    }
+    if own.get("density").is_none() {
+        own["grid"] = json!([draw.one_of(&[16, 24, 32])].repeat(3));
+    }
+    if own.get("medium").is_some() {
+        own["source"] = json!({"type": draw.one_of(&["pencil", "isotropic", "planar"])});
+    }
+    draw.maybe(&mut own, "tally", 0.3, |_| json!("absorbed"));
+    own
 }
 
 /// Parameters with the medium in each place that may have one.

@@ -15,9 +15,18 @@ pub(super) fn cases() -> Cases {
             tiny(TECHNIQUE.name, "sphere", 8, 1, &json!({"mode": "xray"})),
         ],
         draw,
-        truth: |own| set(own, &[("exact", json!(true)), ("empty_space_skipping", json!(false))]),
+        truth: |own| {
+            let is_spline = own.get("interpolation").is_some_and(|i| i == "b_spline" || i == "catmull_rom");
+            set(
+                own,
+                &[("exact", json!(!is_spline)), ("step_voxels", json!(FINE)), ("empty_space_skipping", json!(false))],
+            );
+        },
     }
 }
+
+/// The step of a truth that is not exact, in voxels.
+const FINE: f64 = 0.05;
 
 /// Parameters at random.
 fn draw(draw: &mut Draw<'_>) -> Value {

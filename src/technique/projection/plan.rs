@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::{DeviceMode, Mode, Parameters, Projection, TECHNIQUE};
 use crate::device::Resume;
@@ -158,6 +158,7 @@ impl Parameters {
             step: (if self.walked() { 1.0 } else { self.step_voxels } * smallest) as f32,
             state_words: STATE_WORDS,
             stepless: self.walked(),
+            cheap: false,
             biased: false,
             opacity_threshold: 1.0,
             reasons,
@@ -205,8 +206,14 @@ impl PreparedView for Prepared {
     }
 
     fn settings(&self, open: &Open<'_>) -> Option<Settings> {
-        let ways = [Way::as_given(&self.parameters)];
-        stepping(TECHNIQUE.name, open, &ways, |p, step| Arc::new(Parameters { step_voxels: step, ..p.clone() }))
+        let given = &self.parameters;
+        let exact = Parameters { exact: Some(true), ..given.clone() };
+        let is_open = !given.walked() && !given.is_spline() && open.leaves("exact");
+        let change = Some(("exact", json!(true)));
+        let exact = is_open.then_some(Way { words: ", exact", change, parameters: exact });
+        stepping(TECHNIQUE.name, open, &[Way::as_given(given)], exact, |p, step| {
+            Arc::new(Parameters { step_voxels: step, ..p.clone() })
+        })
     }
 
     fn warnings(&self) -> Vec<Value> {

@@ -156,6 +156,7 @@ impl View for Scatterer {
             step: (CELL as f64 * volume.smallest_side()) as f32,
             state_words: STATE_WORDS,
             stepless: true,
+            cheap: false,
             biased: self.parameters.tracking == Asked::March,
             opacity_threshold: 1.0,
             reasons: vec![why, format!("sigma_t_per_unit: {:.6}, {:.6}, {:.6}", sigma[0], sigma[1], sigma[2])],

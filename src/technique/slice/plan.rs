@@ -90,6 +90,7 @@ impl View for Parameters {
             step: volume.smallest_side() as f32,
             state_words: 0,
             stepless: true,
+            cheap: true,
             biased: false,
             opacity_threshold: 1.0,
             reasons,

@@ -152,3 +152,49 @@ fn a_field_gets_the_photons_that_its_picture_needs_and_no_more() {
         }
     });
 }
+
+#[test]
+fn a_reference_that_has_steps_is_not_taken_for_the_truth() {
+    on_a_bench(|bench| {
+        let cells = |p: [f64; 3]| p.iter().map(|v| ((v + 1.0) * 12.0).floor()).sum::<f64>().rem_euclid(2.0);
+        let volume = bench.floats([24; 3], [2.0; 3], cells).unwrap();
+        let asked = |view: Value| {
+            let mut request = json!({"technique": "auto", "volume": volume, "image": {"width": 48, "height": 32}, "budget": {"max_error": 0.03},
+                "camera": {"eye": [0.7, 2.3, 0.4], "fov_y_deg": 37}});
+            request.as_object_mut().unwrap().extend(view.as_object().unwrap().clone());
+            request
+        };
+        // Greatest values lie at the corners of voxels. Steps of any length miss them by an amount of first order; the exact way does not.
+        let peaks = asked(
+            json!({"projection": {"mode": "maximum", "interpolation": "trilinear", "window": {"low": 0.6, "high": 1}}}),
+        );
+        let found = plan(bench, &peaks);
+        assert_eq!(found.considered[0].words, "projection, exact");
+        let mut truth = peaks.clone();
+        (truth["technique"], truth["projection"]["exact"]) = (json!("projection"), json!(true));
+        (truth["budget"], truth["seed"]) = (json!({"samples": 256}), json!(9));
+        let values = bench.run(&truth, Reads::Luminance).unwrap().values;
+        let error = Truth { values, own_squared: 0.0 }.error(bench, &found.request);
+        assert!(error <= 0.03, "{error}: {:?}", found.considered);
+
+        // With a step of the request's own, nothing that the planner tries has a shorter one.
+        let stepped = asked(json!({"emission_absorption": {"step_voxels": 1.0}}));
+        let found = plan(bench, &stepped);
+        assert_eq!(found.bound(&stepped), None);
+        let run = bench.run(&stepped, Reads::Luminance).unwrap();
+        assert_eq!(
+            (&run.reply["error_parts"]["source"], &run.reply["error_parts"]["planned"]),
+            (&json!("picture"), &Value::Null)
+        );
+    });
+}
+
+#[test]
+fn a_picture_of_nothing_is_planned_with_the_least_work() {
+    on_a_bench(|bench| {
+        let nothing = json!({"technique": "auto", "volume": {"builtin": "constant", "resolution": 16}, "isosurface": {"isovalue": 1},
+            "image": {"width": 24, "height": 24}, "budget": {"max_error": 0.1}});
+        let found = plan(bench, &nothing);
+        assert!(found.samples == 1 && found.error.value == 0.0, "{} samples, {:?}", found.samples, found.error);
+    });
+}

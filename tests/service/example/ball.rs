@@ -91,6 +91,7 @@ impl View for Parameters {
             step: 1.0,
             state_words: 0,
             stepless: true,
+            cheap: false,
             biased: false,
             opacity_threshold: 1.0,
             reasons: vec!["the surface is a root of a quadratic equation".into()],
