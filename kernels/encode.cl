@@ -127,7 +127,24 @@ static inline void of_film(constant Encode *d, global const float *film, global 
             noise += squared;
             squares += part * part;
         }
+#if !WHOLE
+        // A film of fewer pixels is interpolated: its loss counts down the columns, too.
+        int has_next = rows == 2 && y0 + 2 < d->height;
+        Real next = (Real)(0.0f);
+        if (has_next) {
+            Real alpha;
+            next = select(next, luminances(load_pixels(film, (y0 + 2) * d->width + x, &alpha)), lanes);
+            float ratio = rescale(&scale, fabs(next));
+            if (ratio != 1.0f) truncated *= ratio, blocks *= ratio, block_squares *= ratio * ratio, between *= ratio;
+        }
+#endif
         float one = inverse(scale);
+#if !WHOLE
+        if (has_next) {
+            Real deviation = one * (light[1] - 0.5f * (light[0] + next));
+            between += sum_lanes(deviation * deviation), pixels += (float)min(inside, LANES);
+        }
+#endif
 #if LANES == 1
         if (rows == 2 && (x & 1)) {
             float block = of_four(before[0][1] * one, light[0] * one, before[1][1] * one, light[1] * one);

@@ -67,10 +67,9 @@ impl Film {
     pub fn error(&self) -> ErrorEstimate {
         let sums = &self.sums;
         let is_whole = self.main.stride == 1;
-        let block = sums.of_blocks();
         let noise = self.noise_squared();
         let discretisation = self.step_bound();
-        let resolution = (!is_whole).then_some(block);
+        let resolution = (!is_whole).then(|| sums.of_fewer_pixels());
         // A probe whose rays go to their end has measured what is behind the ends of the others.
         let is_measured = self.to_the_end && discretisation.is_some();
         let truncation = (!is_measured).then(|| (sums.truncated / self.main.pixels().max(1) as f64).sqrt());

@@ -90,7 +90,8 @@ impl Planner<'_> {
         let asked = Asked { planner: self, scene: &seen.scene };
         let Settings { all, ruled_out } = seen.settings(target.error);
         let steps = seen.view.plan();
-        let is_whole = !steps.biased && (steps.stepless || all.len() > 1);
+        let to_the_end = seen.view.parameters_to_the_end(seen.scene.camera()).is_none();
+        let is_whole = !steps.biased && to_the_end && (steps.stepless || all.len() > 1);
         let skipped = |(setting, bound, why)| Considered { bias: Some(bound), ..Considered::skipped(&setting, why) };
         let mut considered: Vec<Considered> = ruled_out.into_iter().map(skipped).collect();
         // A setting that is wrong by too much is of no use, unless a time is asked for.

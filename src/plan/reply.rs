@@ -101,7 +101,7 @@ pub struct Plan {
     pub features: Features,
     /// The request to post: this plan carried out.
     pub request: Value,
-    /// True if all that its error is made of was measured. The cost of a step that the request gives was not.
+    /// True if all that its error is made of was measured. The cost of a step that the request gives was not, nor what rays leave out that end early.
     #[serde(skip)]
     pub is_whole: bool,
 }

@@ -4,12 +4,12 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use super::context::DeviceContext;
+use super::counts;
 use super::layer::Layer;
 use super::motion::Moving;
 use super::probe::{CLOSELY, Probe, Steps};
 use super::rounds::Rounds;
 use crate::device::encode::{EncodeSettings, Encoder, Set};
-use crate::device::enums::{Count, DeviceEnum};
 use crate::device::{Buffer, Device};
 use crate::error::Result;
 use crate::film::picture::Background;
@@ -211,7 +211,7 @@ impl Gathered {
     fn encode_anew(&mut self, context: &DeviceContext) -> Result<Film> {
         let pass = self.shown();
         // A single sample per pixel has no deviation. Its deviations only mark the pixels whose sample was not finite.
-        self.counted = self.read_counts(context)?;
+        self.counted = counts::read(context, &self.counts, self.random)?;
         let counted = self.counted;
         let main = self.layer(pass).unread();
         let settings = EncodeSettings {
@@ -273,22 +273,6 @@ impl Gathered {
     pub fn probe_passed(&mut self, context: &DeviceContext) -> Result<()> {
         let Self { probe, layers, .. } = self;
         probe.iter_mut().try_for_each(|probe| probe.passed(context, &layers[1]))
-    }
-
-    fn read_counts(&self, context: &DeviceContext) -> Result<SampleCounts> {
-        let mut counts = [0u32; Count::LENGTH];
-        context.device.read(&self.counts, 0, &mut counts)?;
-        let of = |count: Count| counts[count as usize];
-        let unit = self.random.and_then(|r| r.clamp_luminance).unwrap_or(0.0) / 65536.0;
-        let clamped = u64::from(of(Count::ClampedEnergyHigh)) << 32 | u64::from(of(Count::ClampedEnergyLow));
-        Ok(SampleCounts {
-            non_finite: of(Count::NonFinite),
-            fireflies: of(Count::Fireflies),
-            clamped: of(Count::Clamped),
-            broken: of(Count::Broken),
-            clamped_luminance: clamped as f64 * unit,
-            cut: of(Count::Cut),
-        })
     }
 }
 

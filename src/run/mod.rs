@@ -6,6 +6,7 @@
 mod begin;
 mod compile;
 mod context;
+mod counts;
 mod device_thread;
 mod device_volume;
 mod distances;

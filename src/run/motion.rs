@@ -26,6 +26,9 @@ const MOST_STRIDE: u32 = 16;
 /// The steps that are tried, relative to the requested one.
 const STEPS: [f32; 3] = [1.0, 2.0, 4.0];
 
+/// The factor by which losses may be larger from a camera that sees something else.
+const FAR: f64 = 2.0;
+
 /// The random stream of moving pictures. The passes at rest have others.
 const STREAM: u32 = 2;
 
@@ -92,16 +95,16 @@ impl Motion {
         self.losses = Losses::of(film).map(|losses| (losses, *camera)).or(self.losses);
     }
 
-    /// The reduction of a picture of `rays` rays that take `ray_ms` each by a camera, and the loss of its longer step. It loses the least of all reductions
-    /// that are in time; nothing is reduced if the whole picture is in time. Unknown losses are taken to be equal. From far away, what another camera has
-    /// shown chooses, but is not stated.
+    /// The reduction of a picture of `rays` rays that take `ray_ms` each by a camera, and what is known of its error. It loses the least of all reductions
+    /// that are in time; nothing is reduced if the whole picture is in time. Unknown losses are taken to be equal, and are not stated. If the losses are
+    /// those of a camera that sees something else, they may be larger here.
     pub fn least(&mut self, rays: f64, ray_ms: f64, stepless: bool, camera: &Camera) -> (Lowered, Reduced) {
         self.is_smooth = true;
         if rays * ray_ms <= self.smooth.device_ms {
             return (Lowered::default(), Reduced::default());
         }
         let unknown = Losses { resolution: 1.0, step: (!stepless).then_some(1.0), own: None, noise: None };
-        let is_near = self.losses.is_some_and(|(_, of)| of.is_near(camera));
+        let is_far = self.losses.is_some_and(|(_, of)| !of.is_near(camera));
         let losses = self.losses.map_or(unknown, |(losses, _)| losses);
         let mut lowered = losses.least(rays, ray_ms, self.smooth.device_ms);
         self.is_smooth =
@@ -109,9 +112,10 @@ impl Motion {
         if !self.is_smooth {
             lowered = losses.least(rays, ray_ms, self.steady.device_ms);
         }
-        let known = if stepless { Some(0.0) } else { losses.own.filter(|_| is_near) };
-        let step = known.map(|own| own + losses.of_step(lowered.step));
-        (lowered, Reduced { step, noise: losses.noise.filter(|_| is_near) })
+        let margin = if is_far { FAR } else { 1.0 };
+        let own = if stepless { Some(0.0) } else { losses.own };
+        let step = own.map(|own| margin * (own + losses.of_step(lowered.step)));
+        (lowered, Reduced { step, noise: losses.noise.map(|noise| margin * noise) })
     }
 }
 
@@ -265,7 +269,9 @@ mod tests {
         assert_eq!(lowered, Lowered { stride: 1, step: 4.0 });
         assert!((losses.step.unwrap_or(0.0) - 0.05).abs() < 1e-12);
         let far = gentle.least(3e5, 1e-4, false, &from(40.0));
-        assert_eq!(far, (lowered, Reduced::default()), "what another camera has shown is not stated");
+        assert!(far.0 == lowered && far.1.step == losses.step.map(|step| 2.0 * step), "from far away it may be more");
+        let nothing = Motion::new().least(3e5, 1e-4, false, &from(0.0));
+        assert_eq!(nothing.1, Reduced::default(), "what is not known is not stated");
         assert!(gentle.is_smooth);
         // A step of twice would bring 20 ms of rays in time, but lose 20 %. So the whole picture is rendered, 30 times per second.
         let mut rough = motion(Losses { resolution: 0.5, step: Some(0.2), own: Some(0.0), noise: None });

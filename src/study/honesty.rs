@@ -88,11 +88,9 @@ impl Honesty {
         Figures::of(&self.scenes())
     }
 
-    /// Takes over outcomes of an earlier run of the same program, but for scenes that were run again.
+    /// Takes over the outcomes of earlier runs, but for scenes that were run again. Each part names its program and its machine.
     pub fn keep(&mut self, old: Self) {
-        let program = |machine: &Machine| (machine.version.clone(), machine.commit.clone());
-        let Some(newest) = self.parts.first().map(|part| program(&part.machine)) else { return };
-        for mut earlier in old.parts.into_iter().filter(|part| program(&part.machine) == newest) {
+        for mut earlier in old.parts {
             let again = |o: &Outcome| self.scenes().iter().any(|new| new.scene == o.scene);
             earlier.scenes = earlier.scenes.into_iter().filter(|o| !again(o)).collect();
             match self.parts.iter_mut().find(|part| part.machine.is_same(&earlier.machine)) {

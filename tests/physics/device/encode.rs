@@ -62,7 +62,9 @@ fn plain(film: &Samples, threshold: f64, lanes: usize) -> Sums {
             let at = y * film.width + x;
             let four = [at, at + 1, at + film.width, at + film.width + 1].map(|i| film.luminance(i));
             let mean = four.iter().sum::<f64>() / 4.0;
-            sums.blocks += four.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / 4.0;
+            let block = four.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / 4.0;
+            sums.blocks += block;
+            sums.block_squares += block * block;
         }
     }
     // All pixels but the last of a packet, or of 32 pixels one by one, have a neighbour at hand.
@@ -71,6 +73,12 @@ fn plain(film: &Samples, threshold: f64, lanes: usize) -> Sums {
         let x = i % film.width;
         if x % 2 == 1 && x % part + 1 < part && x + 1 < film.width {
             sums.between += (film.luminance(i) - 0.5 * (film.luminance(i - 1) + film.luminance(i + 1))).powi(2);
+            sums.pixels_between += 1;
+        }
+        // Every second row of a film that is interpolated lies between two others.
+        let (y, wide) = (i / film.width, film.width);
+        if film.stride > 1 && y % 2 == 1 && y + 1 < film.height {
+            sums.between += (film.luminance(i) - 0.5 * (film.luminance(i - wide) + film.luminance(i + wide))).powi(2);
             sums.pixels_between += 1;
         }
     }
@@ -115,7 +123,7 @@ fn plain_picture(film: &Samples, size: [usize; 2], background: Background) -> (V
 
 /// All sums as numbers.
 fn numbers(s: &Sums) -> Vec<f64> {
-    let own = [s.luminance, s.weighted, s.truncated, s.noise, s.noise_squares, s.blocks, s.between];
+    let own = [s.luminance, s.weighted, s.truncated, s.noise, s.noise_squares, s.blocks, s.block_squares, s.between];
     let counts = [s.block_count, s.pixels_between as usize, s.unknown as usize].map(|n| n as f64);
     own.into_iter().chain(counts).collect()
 }

@@ -181,3 +181,31 @@ async fn a_frame_in_motion_says_what_was_lowered_and_one_at_rest_has_it_all() {
     assert!(frame.headers().get("x-cloudchamber-lowered").is_none());
     api.delete(&path).await;
 }
+
+#[tokio::test]
+async fn a_field_keeps_its_error_for_another_camera_and_random_paths_do_not_know_it() {
+    let server = shared();
+    let api = Api::new(&server);
+    let field = json!({"photon_transport": {"photons": 30_000, "grid": [12, 12, 12], "albedo": 0.8}});
+    let image = json!({"width": 32, "height": 24});
+    let body = json!({"technique": "emission_absorption", "image": image, "budget": {"samples": 2}, "volume": field});
+    let first = api.finish(&body).await;
+    let of = |resource: &Value, part: &str| resource["error_parts"][part].as_f64();
+    assert!(of(&first, "field") > Some(0.0) && of(&first, "total") > of(&first, "field"), "{}", first["error_parts"]);
+    let path = first["links"]["self"].as_str().unwrap();
+    let camera = json!({"eye": [2.0, 1.5, 2.5], "target": [0.5, 0.5, 0.5]});
+    assert_eq!(api.put(&format!("{path}/camera"), &camera).await.status(), 200);
+    let moved = api.until_state(path, "done").await;
+    assert_eq!(of(&moved, "field"), of(&first, "field"), "the change that the first camera has shown stands in");
+    assert!(of(&moved, "total") > of(&moved, "field"), "{}", moved["error_parts"]);
+
+    let paths = json!({"technique": "single_scatter", "image": image, "budget": {"samples": 20, "max_error": 0.5},
+        "volume": field, "medium": {"sigma_t_per_unit": 1, "albedo": 0.5}, "lights": [{"type": "sky", "radiance": 1}]});
+    let seen = api.finish(&paths).await;
+    assert_eq!(
+        (of(&seen, "field"), of(&seen, "total")),
+        (None, None),
+        "two pictures of random paths differ by their own noise"
+    );
+    assert_eq!(seen["stopped_by"], "samples", "what is not known stops nothing");
+}
