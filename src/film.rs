@@ -14,7 +14,7 @@ mod sums;
 use std::sync::Arc;
 
 pub use chance::by_chance;
-pub use estimate::{ErrorEstimate, Source};
+pub use estimate::{ErrorEstimate, LEAST_STATED, Source};
 pub use field::FieldError;
 pub use lowered::Lowered;
 use picture::Background;
@@ -151,6 +151,8 @@ pub struct Film {
     pub lowered: Lowered,
     /// The losses of a picture that was reduced to be in time, relative, as earlier pictures showed them.
     pub reduced: Option<Reduced>,
+    /// The error that is asked for.
+    pub asked: Option<f64>,
     /// What a planner knows of a picture made as it planned.
     pub planned: Option<Planned>,
     /// The rounds of a pilot.

@@ -4,6 +4,10 @@ use serde::Serialize;
 
 use super::{Estimate, Film, Planned};
 
+/// The least error that is stated, unless a lesser one is asked for or there is none at all. The bytes of a PNG round a mid grey by five times as much, and
+/// a probe of some pixels is no proof of less.
+pub const LEAST_STATED: f64 = 1e-3;
+
 /// The estimated error of a picture: root mean square over its pixels of the error of linear luminance, divided by the picture's mean
 /// luminance (absolute if that is 0). A part is null if it is not known, or not apart from the others.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Default)]
@@ -47,6 +51,11 @@ impl ErrorEstimate {
 }
 
 impl ErrorEstimate {
+    /// The estimate with no smaller total than this, unless that is 0.
+    fn at_least(self, least: f64) -> Self {
+        Self { total: self.total.map(|total| if total > 0.0 { total.max(least) } else { total }), ..self }
+    }
+
     /// The estimate beside a planner's. Its own bound knows nothing of what the plan leaves out. Both bounds hold, so the lesser is the better founded.
     fn beside(self, planned: Option<Planned>) -> Self {
         let Some(planned) = planned else { return self };
@@ -91,6 +100,7 @@ impl Film {
             ..ErrorEstimate::default()
         }
         .beside(self.planned_now())
+        .at_least(self.asked.map_or(LEAST_STATED, |asked| asked.min(LEAST_STATED)))
     }
 
     /// What the planner knows, with its bound if this picture is the planned one.
@@ -224,6 +234,19 @@ mod tests {
         let reduced = Some(Reduced { step: Some(0.3), noise: Some(0.4) });
         let total = Film { reduced, ..film(1, None, None) }.error().total.unwrap_or(f64::NAN);
         assert!((total - 0.5).abs() < 1e-12, "{total}");
+    }
+
+    #[test]
+    fn what_cannot_be_seen_is_stated_as_the_least_that_can() {
+        let of = |bound: f64, asked: Option<f64>| {
+            let error = Film { asked, ..film(4, Some(ProbedNoise::default()), Some(bound)) }.error();
+            (error.total, error.discretisation)
+        };
+        // The step's bound is relative to a mean of 0.5.
+        assert_eq!(of(1e-5, None), (Some(LEAST_STATED), Some(2e-5)));
+        assert_eq!(of(1e-5, Some(3e-4)), (Some(3e-4), Some(2e-5)), "a lesser one is asked for");
+        assert_eq!(of(0.0, None), (Some(0.0), Some(0.0)), "there is none");
+        assert_eq!(of(0.01, Some(3e-4)).0, Some(0.02));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use crate::film::{ErrorEstimate, Lowered};
+use crate::film::{ErrorEstimate, LEAST_STATED, Lowered};
 use crate::power_law::PowerLaw;
 use crate::technique::Progress;
 
@@ -128,7 +128,7 @@ pub(super) fn slope(trace: &[TracePoint]) -> Option<f64> {
     let points: Vec<(f64, f64)> = trace
         .iter()
         .filter(|p| p.stride == 1 && p.samples >= 2)
-        .filter_map(|p| Some((f64::from(p.samples), p.error.filter(|error| *error > 0.0)?)))
+        .filter_map(|p| Some((f64::from(p.samples), p.error.filter(|error| *error > LEAST_STATED)?)))
         .collect();
     PowerLaw::through(&points).map(|l| l.power)
 }

@@ -49,6 +49,7 @@ pub(super) struct Gathered {
     /// The error that the field causes, if there is a field and it is known.
     pub field_error: Option<FieldError>,
     has_field: bool,
+    asked: Option<f64>,
     planned: Option<Planned>,
     random: Option<Random>,
     stepless: bool,
@@ -101,6 +102,7 @@ impl Gathered {
             field_error: None,
             has_field: scene.subject().field().is_some(),
             random: scene.view().random(),
+            asked: scene.budget().max_error,
             planned: scene.planned(),
             stepless: plan.stepless,
             biased: plan.biased,
@@ -246,6 +248,7 @@ impl Gathered {
             background: self.background,
             lowered,
             reduced,
+            asked: self.asked,
             planned: self.planned,
             rounds: self.rounds.all(),
         })

@@ -1,13 +1,14 @@
 //! Figures of the study of stated errors.
 
 use super::Outcome;
+use crate::film::LEAST_STATED;
 
 /// A true error up to this factor above the stated one is nearly covered.
 pub(super) const NEARLY: f64 = 1.5;
 /// A stated error this factor above the true one says little.
 pub(super) const MUCH: f64 = 4.0;
-/// The least true error whose ratio counts: smaller ones are below what a byte shows.
-pub(super) const LEAST: f64 = 1e-4;
+/// The least true error whose ratio counts.
+pub(super) const LEAST: f64 = LEAST_STATED;
 
 /// Figures of some scenes.
 #[derive(Debug, Clone, PartialEq)]
