@@ -78,7 +78,9 @@ impl Film {
         let is_whole = self.main.stride == 1;
         let noise = self.noise_squared();
         let discretisation = self.step_bound();
-        let resolution = (!is_whole).then(|| sums.of_fewer_pixels());
+        // Of random paths the differences of pixels are noise, whose bound has a margin.
+        let of_fewer = || if self.noisy { sums.noise_of_blocks().upper().sqrt() } else { sums.of_fewer_pixels() };
+        let resolution = (!is_whole).then(of_fewer);
         // A probe whose rays go to their end has measured what is behind the ends of the others.
         let is_measured = self.to_the_end && discretisation.is_some();
         let truncation = (!is_measured).then(|| (sums.truncated / self.main.pixels().max(1) as f64).sqrt());
@@ -237,9 +239,23 @@ mod tests {
     }
 
     #[test]
+    fn a_preview_of_random_paths_has_the_margin_of_few_pixels() {
+        let sums = Sums { luminance: 2.0, blocks: 0.03, block_squares: 0.0009, block_count: 1, ..Sums::default() };
+        let main = Samples { width: 2, height: 2, stride: 4, count: 1, ..Samples::default() };
+        let of =
+            |noisy: bool| Film { size: [8, 8], main: main.clone(), sums, noisy, stepless: true, ..Film::default() };
+        let (smooth, random) = (of(false).error().total, of(true).error().total);
+        assert!((smooth.unwrap_or(0.0) - 0.03f64.sqrt() / 0.5).abs() < 1e-12, "{smooth:?}");
+        let bound = (0.04 * (1.0 + UPPER * 2f64.sqrt())).sqrt() / 0.5;
+        assert!((random.unwrap_or(0.0) - bound).abs() < 1e-12, "one block: {random:?}, {bound}");
+    }
+
+    #[test]
     fn what_cannot_be_seen_is_stated_as_the_least_that_can() {
         let of = |bound: f64, asked: Option<f64>| {
-            let error = Film { asked, ..film(4, Some(ProbedNoise::default()), Some(bound)) }.error();
+            let noiseless =
+                ProbedNoise { of_random: Some(Estimate::default()), random: 0.0225, ..ProbedNoise::default() };
+            let error = Film { asked, ..film(4, Some(noiseless), Some(bound)) }.error();
             (error.total, error.discretisation)
         };
         // The step's bound is relative to a mean of 0.5.

@@ -92,7 +92,7 @@ impl Honesty {
     pub fn keep(&mut self, old: Self) {
         for mut earlier in old.parts {
             let again = |o: &Outcome| self.scenes().iter().any(|new| new.scene == o.scene);
-            earlier.scenes = earlier.scenes.into_iter().filter(|o| !again(o)).collect();
+            earlier.scenes.retain(|o| !again(o));
             match self.parts.iter_mut().find(|part| part.machine.is_same(&earlier.machine)) {
                 Some(part) => part.scenes.extend(earlier.scenes),
                 None => self.parts.push(earlier),
