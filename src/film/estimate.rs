@@ -48,9 +48,7 @@ impl ErrorEstimate {
     pub fn bias(&self) -> f64 {
         [self.discretisation, self.resolution, self.truncation, self.field].into_iter().flatten().fold(0.0, f64::hypot)
     }
-}
 
-impl ErrorEstimate {
     /// The estimate with no smaller total than this, unless that is 0.
     fn at_least(self, least: f64) -> Self {
         Self { total: self.total.map(|total| if total > 0.0 { total.max(least) } else { total }), ..self }
