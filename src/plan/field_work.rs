@@ -8,6 +8,8 @@
 
 use std::sync::Arc;
 
+use serde_json::{Value, json};
+
 use super::found::Found;
 use super::noise::in_common;
 use super::pilot::{PIXELS, SAMPLES};
@@ -20,7 +22,6 @@ use crate::render::Scene;
 use crate::render::region::Region;
 use crate::technique::AskedField;
 use crate::volume::Volume;
-use serde_json::{Value, json};
 
 /// The device time that a small field is to take, ms.
 const PILOT_MS: f64 = 60.0;

@@ -21,17 +21,20 @@ pub(super) fn cases() -> Cases {
     Cases { all, tiny: tiny(), draw, ..Cases::default() }
 }
 
-/// The chamber, a cube of one medium, or a cloud: a field at random. The cube has the default side.
+/// The chamber, a cube of one medium, or a cloud: a field at random. The chamber and the cube have a side of 1 mm.
 fn draw(draw: &mut Draw<'_>) -> Value {
     let mut own = json!({"photons": draw.logarithmic(2e4, 2e5).round(), "seed": draw.between(0.0, 1e6).round()});
     let (absorption, scattering) = (draw.extinction(0.1, 3.0), draw.extinction(2.0, 40.0));
     let phase = json!({"type": "henyey_greenstein", "g": draw.between(0.0, 0.9)});
     match draw.one_of(&["chamber", "cube", "cloud"]) {
-        "cube" => own["medium"] = json!({"mu_a_per_mm": absorption, "mu_s_per_mm": scattering, "phase": phase}),
+        "cube" => {
+            own["size_mm"] = json!([1, 1, 1]);
+            own["medium"] = json!({"mu_a_per_mm": absorption, "mu_s_per_mm": scattering, "phase": phase});
+        }
         "cloud" => {
             own["density"] = json!({"builtin": draw.one_of(&["smoke", "gaussian"]), "resolution": 32});
             // A built-in has a side of 2.
-            own["medium"] = json!({"mu_a_per_mm": 30.0 * absorption, "mu_s_per_mm": 30.0 * scattering, "phase": phase});
+            own["medium"] = json!({"mu_a_per_mm": 0.5 * absorption, "mu_s_per_mm": 0.5 * scattering, "phase": phase});
         }
         _ => own["albedo"] = json!(draw.between(0.3, 0.95)),
     }
