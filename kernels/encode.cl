@@ -19,6 +19,12 @@ static inline float rescale(float *scale, Real values) {
     return ratio * ratio;
 }
 
+// Raises `scale`, and the sums of squares that are relative to it.
+static inline void raise(float *scale, Real values, Real *truncated, float *blocks, float *block_squares, float *between) {
+    float ratio = rescale(scale, values);
+    if (ratio != 1.0f) *truncated *= ratio, *blocks *= ratio, *block_squares *= ratio * ratio, *between *= ratio;
+}
+
 static inline float inverse(float scale) { return scale > 0.0f ? 1.0f / scale : 0.0f; }
 
 static inline float sum_lanes(Real v) {
@@ -111,8 +117,7 @@ static inline void of_film(constant Encode *d, global const float *film, global 
             light[row] = l;
             luminance += l;
             weighted += l * (float)samples;
-            float ratio = rescale(&scale, fabs(l));
-            if (ratio != 1.0f) truncated *= ratio, blocks *= ratio, block_squares *= ratio * ratio, between *= ratio;
+            raise(&scale, fabs(l), &truncated, &blocks, &block_squares, &between);
             Real through = 1.0f - alpha;
             Real behind = (through > 0.0f ? through : (Real)(0.0f)) * l * inverse(scale);
             truncated += select((Real)(0.0f), behind * behind, MASK(through <= d->ended));
@@ -121,7 +126,7 @@ static inline void of_film(constant Encode *d, global const float *film, global 
             unknown += count_lanes(~known(m2) & lanes);
             if (samples < 2) continue;
             Real squared = select((Real)(0.0f), m2 / ((float)samples * (float)(samples - 1)), known(m2) & lanes);
-            ratio = rescale(&noise_scale, squared);
+            float ratio = rescale(&noise_scale, squared);
             if (ratio != 1.0f) squares *= ratio;
             Real part = squared * inverse(noise_scale);
             noise += squared;
@@ -134,8 +139,7 @@ static inline void of_film(constant Encode *d, global const float *film, global 
         if (has_next) {
             Real alpha;
             next = select(next, luminances(load_pixels(film, (y0 + 2) * d->width + x, &alpha)), lanes);
-            float ratio = rescale(&scale, fabs(next));
-            if (ratio != 1.0f) truncated *= ratio, blocks *= ratio, block_squares *= ratio * ratio, between *= ratio;
+            raise(&scale, fabs(next), &truncated, &blocks, &block_squares, &between);
         }
 #endif
         float one = inverse(scale);

@@ -9,17 +9,18 @@ pub mod picture;
 mod probed;
 mod rounds;
 pub mod srgb;
+mod stated;
 mod sums;
 
 use std::sync::Arc;
 
 pub use chance::by_chance;
-pub use estimate::{ErrorEstimate, LEAST_STATED, Source};
 pub use field::FieldError;
 pub use lowered::Lowered;
 use picture::Background;
 pub use probed::{Estimate, ProbePixel, ProbedNoise, ProbedStep, StepPixel};
 pub(crate) use rounds::{Round, is_round, pilot_rounds};
+pub use stated::{ErrorEstimate, LEAST_STATED, Source, Unknown};
 pub use sums::Sums;
 
 /// Means and squared deviations of one set of samples, as the device leaves them (`kernels/shared/film.h`).
@@ -149,7 +150,7 @@ pub struct Film {
     pub background: Background,
     /// The quality that was reduced so that the picture came in time.
     pub lowered: Lowered,
-    /// The losses of a picture that was reduced to be in time, relative, as earlier pictures showed them.
+    /// What earlier pictures have shown of one that is to be in time.
     pub reduced: Option<Reduced>,
     /// The error that is asked for.
     pub asked: Option<f64>,
@@ -170,12 +171,12 @@ pub struct Planned {
     pub bias: f64,
 }
 
-/// The losses of a picture that was reduced to be in time, relative.
+/// What earlier pictures have shown of a picture of one sample per pixel that has no probe.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Reduced {
-    /// An upper bound of what its step costs, if it is known.
+    /// An upper bound of what its step costs, relative, if it is known.
     pub step: Option<f64>,
-    /// The noise of one sample per pixel, if it is known.
+    /// An upper bound of its noise as a multiple of the deviation within blocks of 2 × 2 pixels, if it is known.
     pub noise: Option<f64>,
 }
 

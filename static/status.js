@@ -97,8 +97,10 @@ export class Status {
   #report(resource) {
     byId('warnings').replaceChildren(...(resource.warnings ?? [])
       .map((warning) => make('li', { textContent: wordsOf(warning), title: warning.code ?? '' })));
-    const parts = Object.entries(resource.error_parts ?? {}).filter(([name, part]) => name !== 'total' && Number.isFinite(part));
-    byId('error-parts').replaceChildren(...table('Error, by its causes', parts.map(([name, part]) => [name, percent(part)])));
+    const { unknown, ...error } = resource.error_parts ?? {};
+    const parts = Object.entries(error).filter(([name, part]) => name !== 'total' && Number.isFinite(part));
+    const rows = [...parts.map(([name, part]) => [name, percent(part)]), ...(unknown ? [['not known', unknown]] : [])];
+    byId('error-parts').replaceChildren(...table('Error, by its causes', rows));
     const counts = Object.entries(resource.counts ?? {}).filter(([, count]) => Number(count) > 0);
     byId('counts').replaceChildren(...table('Counts', counts));
     byId('result').replaceChildren(...table('Computed besides', flat(resource.result ?? {})));

@@ -1,73 +1,14 @@
 //! The error of a film, estimated from the film itself. docs/error.md has the whole.
 
-use serde::Serialize;
-
+use super::probed::UPPER;
+use super::stated::{ErrorEstimate, LEAST_STATED, Unknown};
 use super::{Estimate, Film, Planned};
 
-/// The least error that is stated, unless a lesser one is asked for or there is none at all. The bytes of a PNG round a mid grey by five times as much, and
-/// a probe of some pixels is no proof of less.
-pub const LEAST_STATED: f64 = 1e-3;
-
-/// The estimated error of a picture: root mean square over its pixels of the error of linear luminance, divided by the picture's mean
-/// luminance (absolute if that is 0). A part is null if it is not known, or not apart from the others.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Default)]
-pub struct ErrorEstimate {
-    /// An upper bound of the error of all parts together, which 95 of 100 pictures keep. It is null if a part is not known yet.
-    pub total: Option<f64>,
-    /// The standard error of the mean over the samples.
-    pub noise: Option<f64>,
-    /// An upper bound of what the step costs; with what is behind the ends of rays, if they end early.
-    pub discretisation: Option<f64>,
-    /// The loss of a picture of fewer pixels than asked for.
-    pub resolution: Option<f64>,
-    /// The contribution from behind the opacity at which rays end. It is null if a probe has measured it together with the step's.
-    pub truncation: Option<f64>,
-    /// The standard error by a field of random work: the change of the picture since the field had half of it. It is null if that is not known.
-    pub field: Option<f64>,
-    /// What the planner's choice leaves out of the scene that was asked for, if it chose.
-    pub model: Option<f64>,
-    /// The planner's upper bound of the error, if the picture is the planned one.
-    pub planned: Option<f64>,
-    /// Whose bound the total is.
-    pub source: Source,
-}
-
-/// What a stated error is founded on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Default)]
-#[serde(rename_all = "snake_case")]
-pub enum Source {
-    /// The samples of the picture and of its probe.
-    #[default]
-    Picture,
-    /// What the planner's pilots measured: references of many samples, and the picture's own settings beside them.
-    Plan,
-}
-
-impl ErrorEstimate {
-    /// All parts but the noise.
-    pub fn bias(&self) -> f64 {
-        [self.discretisation, self.resolution, self.truncation, self.field].into_iter().flatten().fold(0.0, f64::hypot)
-    }
-
-    /// The estimate with no smaller total than this, unless that is 0.
-    fn at_least(self, least: f64) -> Self {
-        Self { total: self.total.map(|total| if total > 0.0 { total.max(least) } else { total }), ..self }
-    }
-
-    /// The estimate beside a planner's. Its own bound knows nothing of what the plan leaves out. Both bounds hold, so the lesser is the better founded.
-    fn beside(self, planned: Option<Planned>) -> Self {
-        let Some(planned) = planned else { return self };
-        let own = self.total.map(|total| total.hypot(planned.bias));
-        let better = planned.bound.filter(|bound| own.is_none_or(|own| *bound < own));
-        Self {
-            total: better.or(own),
-            model: Some(planned.bias),
-            planned: planned.bound,
-            source: if better.is_some() { Source::Plan } else { Source::Picture },
-            ..self
-        }
-    }
-}
+/// The standard errors by which random noise has a margin: it is exceeded once in a hundred pictures. A technique whose error is noise alone would keep a
+/// bound of 95 of 100 as often as not.
+const SURE: f64 = 2.326;
+/// What none of N paths has met happens to less than this over N of them, at 95 % (Hanley & Lippman-Hand, JAMA 249, 1983: the rule of three).
+const UNMET: f64 = 3.0;
 
 impl Film {
     /// The error, estimated from the samples and the probe.
@@ -77,7 +18,8 @@ impl Film {
         let noise = self.noise_squared();
         let discretisation = self.step_bound();
         // Of random paths the differences of pixels are noise, whose bound has a margin.
-        let of_fewer = || if self.noisy { sums.noise_of_blocks().upper().sqrt() } else { sums.of_fewer_pixels() };
+        let of_blocks = || self.with_unmet(sums.noise_of_blocks()).upper().sqrt();
+        let of_fewer = || if self.noisy { of_blocks() } else { sums.of_fewer_pixels() };
         let resolution = (!is_whole).then(of_fewer);
         // A probe whose rays go to their end has measured what is behind the ends of the others.
         let is_measured = self.to_the_end && discretisation.is_some();
@@ -97,10 +39,24 @@ impl Film {
             resolution: resolution.map(relative),
             truncation: truncation.map(relative),
             field: self.field_error.map(|field| field.change),
+            unknown: self.unknown(upper, discretisation, of_field),
             ..ErrorEstimate::default()
         }
         .beside(self.planned_now())
         .at_least(self.asked.map_or(LEAST_STATED, |asked| asked.min(LEAST_STATED)))
+    }
+
+    /// The reason for which the total is not known, from the parts that it needs.
+    fn unknown(&self, noise: Option<f64>, step: Option<f64>, field: Option<f64>) -> Option<Unknown> {
+        match (noise, step, field) {
+            (_, None, _) if self.biased => Some(Unknown::Bias),
+            (None, ..) if self.noisy => Some(Unknown::Nothing),
+            (None, ..) => Some(Unknown::Probe),
+            (_, None, _) => Some(Unknown::Step),
+            (.., None) if self.noisy => Some(Unknown::Hidden),
+            (.., None) => Some(Unknown::Field),
+            _ => None,
+        }
     }
 
     /// What the planner knows, with its bound if this picture is the planned one.
@@ -141,7 +97,7 @@ impl Film {
             return None;
         }
         if let Some(reduced) = self.reduced {
-            return Some(Estimate { value: self.absolute(reduced.noise?).powi(2), error: 0.0 });
+            return Some(Estimate { value: (reduced.noise? * self.sums.of_blocks()).powi(2), error: 0.0 });
         }
         let (random, pixels) = self.random_noise();
         let squared = random * random;
@@ -154,13 +110,28 @@ impl Film {
             Some(probed) => Some(probed.squared_of(squared)),
             None if !self.noisy => None,
             // The mean of a 2×2 block takes a quarter of random noise away.
-            None if count < 2 => Some(self.sums.noise_of_blocks()),
+            None if count < 2 => Some(self.with_unmet(self.sums.noise_of_blocks())),
             // The squared error of a picture deviates from its own expected value by √(2/ν) of it.
-            None => Some(Estimate {
+            None => Some(self.with_unmet(Estimate {
                 value: squared,
-                error: if pixels > 0.0 { squared * (2.0 / pixels).sqrt() } else { 0.0 },
-            }),
+                error: if pixels > 0.0 { SURE / UPPER * squared * (2.0 / pixels).sqrt() } else { 0.0 },
+            })),
         }
+    }
+
+    /// The square of random noise, whose bound has what no path has met yet, as rare scattering in thin smoke. A path that meets it is taken to change
+    /// its sample by the picture's mean.
+    fn with_unmet(&self, noise: Estimate) -> Estimate {
+        let (pixels, count) = (self.main.pixels().max(1) as f64, f64::from(self.main.count.max(1)));
+        let mean = self.sums.luminance / pixels;
+        let unmet = UNMET / (pixels * count) * mean * mean / count;
+        Estimate { error: noise.error.max((unmet - noise.value) / UPPER), ..noise }
+    }
+
+    /// The upper bound of the noise as a multiple of the deviation within blocks of 2 × 2 pixels, if it is known. Another camera has about the same.
+    pub fn noise_in_blocks(&self) -> Option<f64> {
+        let (noise, blocks) = (self.noise_squared()?.upper().sqrt(), self.sums.of_blocks());
+        Some(if blocks > 0.0 { noise / blocks } else { 1.0 })
     }
 
     /// An upper bound of what the step costs, of luminance. It is `None` if it is not known.
@@ -186,8 +157,7 @@ impl Film {
 
 #[cfg(test)]
 mod tests {
-    use super::super::probed::UPPER;
-    use super::super::{ProbedNoise, ProbedStep, Reduced, Samples, Sums};
+    use super::super::{ProbedNoise, ProbedStep, Reduced, Samples, Source, Sums};
     use super::*;
 
     /// A film of 2 × 2 pixels of luminance 0.5 whose `count` samples have a variance of 0.09 each.
@@ -213,7 +183,7 @@ mod tests {
         let error = Film { stepless: true, noisy: true, ..film(4, None, None) }.error();
         assert!((error.noise.unwrap_or(f64::NAN) - 0.3).abs() < 1e-12, "{error:?}");
         // Four pixels: the square has a relative standard error of √(2/4).
-        let bound = 0.3 * (1.0 + UPPER * 0.5f64.sqrt()).sqrt();
+        let bound = 0.3 * (1.0 + SURE * 0.5f64.sqrt()).sqrt();
         assert!((error.total.unwrap_or(f64::NAN) - bound).abs() < 1e-12, "{error:?}");
     }
 
@@ -221,31 +191,61 @@ mod tests {
     fn what_is_not_known_is_not_zero() {
         let error = film(1, None, None).error();
         assert_eq!((error.total, error.noise, error.discretisation), (None, None, None));
+        assert_eq!(error.unknown, Some(Unknown::Probe));
         let error = film(1, None, Some(0.0)).error();
         assert_eq!((error.total, error.discretisation), (None, Some(0.0)), "one sample has no noise that is known");
         let known = Some(ProbedNoise::default());
-        assert_eq!(film(4, known, None).error().total, None, "the step has not been tried");
+        let of = |film: Film| (film.error().total, film.error().unknown);
+        assert_eq!(of(film(4, known, None)), (None, Some(Unknown::Step)), "the step has not been tried");
+        assert_eq!(of(film(4, known, Some(0.1))).1, None, "all parts are known");
         let biased = Film { biased: true, ..film(4, known, Some(0.0)) };
-        assert_eq!(biased.error().total, None, "a bias that is not measured");
+        assert_eq!(of(biased), (None, Some(Unknown::Bias)), "a bias that is not measured");
+        for (noisy, why) in [(false, Unknown::Field), (true, Unknown::Hidden)] {
+            let of_field = Film { noisy, has_field: true, ..film(4, known, Some(0.0)) };
+            assert_eq!(of(of_field), (None, Some(why)));
+        }
         let black = Film { noisy: true, stepless: true, sums: Sums::default(), ..film(64, None, None) };
         assert_eq!((black.error().total, black.error().noise), (None, None), "nothing found yet is not nothing there");
+        assert_eq!(black.error().unknown, Some(Unknown::Nothing));
         let reduced = Some(Reduced { step: Some(0.1), noise: None });
         assert_eq!(Film { reduced, ..film(1, None, None) }.error().total, None);
-        let reduced = Some(Reduced { step: Some(0.3), noise: Some(0.4) });
-        let total = Film { reduced, ..film(1, None, None) }.error().total.unwrap_or(f64::NAN);
+        // Of a moving picture earlier ones have shown the step's cost, and the noise as a multiple of the deviation within blocks, which is 0.25.
+        let reduced = Some(Reduced { step: Some(0.3), noise: Some(0.8) });
+        let moving = Film { reduced, ..film(1, None, None) };
+        let sums = Sums { blocks: 0.0625, block_count: 1, ..moving.sums };
+        let moving = Film { sums, ..moving };
+        let total = moving.error().total.unwrap_or(f64::NAN);
         assert!((total - 0.5).abs() < 1e-12, "{total}");
+        assert!(moving.noise_in_blocks().is_some_and(|part| (part - 0.8).abs() < 1e-12));
     }
 
     #[test]
     fn a_preview_of_random_paths_has_the_margin_of_few_pixels() {
-        let sums = Sums { luminance: 2.0, blocks: 0.03, block_squares: 0.0009, block_count: 1, ..Sums::default() };
+        let sums = Sums { luminance: 2.0, blocks: 0.3, block_squares: 0.09, block_count: 1, ..Sums::default() };
         let main = Samples { width: 2, height: 2, stride: 4, count: 1, ..Samples::default() };
         let of =
             |noisy: bool| Film { size: [8, 8], main: main.clone(), sums, noisy, stepless: true, ..Film::default() };
         let (smooth, random) = (of(false).error().total, of(true).error().total);
-        assert!((smooth.unwrap_or(0.0) - 0.03f64.sqrt() / 0.5).abs() < 1e-12, "{smooth:?}");
-        let bound = (0.04 * (1.0 + UPPER * 2f64.sqrt())).sqrt() / 0.5;
+        assert!((smooth.unwrap_or(0.0) - 0.3f64.sqrt() / 0.5).abs() < 1e-12, "{smooth:?}");
+        let bound = (0.4 * (1.0 + UPPER * 2f64.sqrt())).sqrt() / 0.5;
         assert!((random.unwrap_or(0.0) - bound).abs() < 1e-12, "one block: {random:?}, {bound}");
+    }
+
+    #[test]
+    fn what_no_path_has_met_may_still_be_there() {
+        // All samples of a sky have the same luminance.
+        let sky = |count: u32, stride: usize| Film {
+            noisy: true,
+            stepless: true,
+            sums: Sums { luminance: 2.0, block_count: 1, ..Sums::default() },
+            main: Samples { width: 2, height: 2, stride, count, ..Samples::default() },
+            ..film(count, None, None)
+        };
+        for (count, stride) in [(1, 1), (1, 4), (16, 1)] {
+            let total = sky(count, stride).error().total.unwrap_or(f64::NAN);
+            let met = (3.0 / 4.0f64).sqrt() / f64::from(count);
+            assert!((total / met - 1.0).abs() < 1e-9, "{count} samples: {total}, {met}");
+        }
     }
 
     #[test]

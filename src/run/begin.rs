@@ -35,7 +35,10 @@ impl Live {
         self.field.iter_mut().for_each(FieldRun::forget_half);
         self.aim(context, &scene, complete)?;
         match &mut self.view {
-            Some(view) if moves => view.hurry(context, &mut self.motion),
+            Some(view) if moves => {
+                view.gathered.field_error = self.motion.field_error;
+                view.hurry(context, &mut self.motion)
+            }
             _ => Ok(()),
         }
     }

@@ -99,23 +99,28 @@ impl Motion {
     /// that are in time; nothing is reduced if the whole picture is in time. Unknown losses are taken to be equal, and are not stated. If the losses are
     /// those of a camera that sees something else, they may be larger here.
     pub fn least(&mut self, rays: f64, ray_ms: f64, stepless: bool, camera: &Camera) -> (Lowered, Reduced) {
+        let is_far = self.losses.is_some_and(|(_, of)| !of.is_near(camera));
+        let lowered = self.lowered(rays, ray_ms, stepless);
+        let losses = self.losses.map(|(losses, _)| losses);
+        let margin = if is_far { FAR } else { 1.0 };
+        let own = if stepless { Some(0.0) } else { losses.and_then(|losses| losses.own) };
+        let longer = losses.map_or(0.0, |losses| losses.of_step(lowered.step));
+        let noise = losses.and_then(|losses| losses.noise);
+        (lowered, Reduced { step: own.map(|own| margin * (own + longer)), noise: noise.map(|noise| margin * noise) })
+    }
+
+    /// The reduction of a picture.
+    fn lowered(&mut self, rays: f64, ray_ms: f64, stepless: bool) -> Lowered {
         self.is_smooth = true;
         if rays * ray_ms <= self.smooth.device_ms {
-            return (Lowered::default(), Reduced::default());
+            return Lowered::default();
         }
         let unknown = Losses { resolution: 1.0, step: (!stepless).then_some(1.0), own: None, noise: None };
-        let is_far = self.losses.is_some_and(|(_, of)| !of.is_near(camera));
         let losses = self.losses.map_or(unknown, |(losses, _)| losses);
-        let mut lowered = losses.least(rays, ray_ms, self.smooth.device_ms);
+        let lowered = losses.least(rays, ray_ms, self.smooth.device_ms);
         self.is_smooth =
             losses.of_lowered(lowered) <= MOST_LOSS && rays * ray_ms * lowered.cost() <= self.smooth.device_ms;
-        if !self.is_smooth {
-            lowered = losses.least(rays, ray_ms, self.steady.device_ms);
-        }
-        let margin = if is_far { FAR } else { 1.0 };
-        let own = if stepless { Some(0.0) } else { losses.own };
-        let step = own.map(|own| margin * (own + losses.of_step(lowered.step)));
-        (lowered, Reduced { step, noise: losses.noise.map(|noise| margin * noise) })
+        if self.is_smooth { lowered } else { losses.least(rays, ray_ms, self.steady.device_ms) }
     }
 }
 
@@ -136,7 +141,7 @@ struct Losses {
     step: Option<f64>,
     /// What the step itself costs, if it is known.
     own: Option<f64>,
-    /// The noise of one sample per pixel, if it is known.
+    /// The noise of one sample per pixel as a multiple of the deviation within blocks of pixels, if it is known.
     noise: Option<f64>,
 }
 
@@ -144,8 +149,8 @@ impl Losses {
     /// The losses that a whole picture of a single sample per pixel shows.
     fn of(film: &Film) -> Option<Self> {
         let is_whole = film.main.count == 1 && film.lowered.is_none();
-        let (step, error) = (film.step_loss_seen(), film.error());
-        let losses = Self { resolution: film.resolution_loss(), step, own: error.discretisation, noise: error.noise };
+        let (step, own) = (film.step_loss_seen(), film.error().discretisation);
+        let losses = Self { resolution: film.resolution_loss(), step, own, noise: film.noise_in_blocks() };
         is_whole.then_some(losses)
     }
 

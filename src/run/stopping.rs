@@ -28,7 +28,8 @@ pub(super) fn next(view: &mut ViewRun, started: Instant, context: &DeviceContext
     if budget.time_ms.is_some_and(|ms| started.elapsed().as_millis() >= u128::from(ms)) {
         return Ok(Next::Stop("time"));
     }
-    let enough = !view.is_random() || samples >= Random::LEAST_SAMPLES;
+    let paths = samples as usize * view.gathered.size.iter().product::<usize>();
+    let enough = !view.is_random() || samples >= Random::LEAST_SAMPLES || paths >= Random::LEAST_PATHS;
     let Some(most) = budget.max_error.filter(|_| enough && is_round(samples)) else { return Ok(Next::GoOn) };
     let film = view.gathered.encode(context)?;
     let error = film.error();

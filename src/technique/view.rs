@@ -62,8 +62,11 @@ pub struct Random {
 }
 
 impl Random {
-    /// Samples per pixel below which the error of random samples is not relied on: no render stops by it, and no samples are placed by it.
+    /// Samples per pixel below which no samples are placed by the deviations of their tiles.
     pub const LEAST_SAMPLES: u32 = 16;
+    /// Samples of all pixels together below which the error of random samples is not relied on: no render of fewer stops by it, unless it has
+    /// [`Self::LEAST_SAMPLES`]. A rare bright path that none of so many has found counts for less than their noise.
+    pub const LEAST_PATHS: usize = 4096;
 }
 
 /// A view with valid parameters.

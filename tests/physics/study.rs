@@ -2,6 +2,7 @@
 
 mod honesty;
 mod planner;
+mod stated;
 
 use std::sync::{Mutex, PoisonError};
 

@@ -50,16 +50,7 @@ fn draw_lines(area: &Area<'_>, record: &Record) -> Drawn {
         .x_label_area_size(44)
         .y_label_area_size(84)
         .build_cartesian_2d(x.log_scale(), y.log_scale())?;
-    chart
-        .configure_mesh()
-        .x_desc("time on the device / ms")
-        .y_desc("error: RMS over the mean of the truth")
-        .label_style(("sans-serif", 13))
-        .axis_desc_style(("sans-serif", 15))
-        .x_label_formatter(&|v| plain(*v))
-        .y_label_formatter(&|v| percent(*v))
-        .light_line_style(WHITE.mix(0.0))
-        .draw()?;
+    axes!(chart, "time on the device / ms", "error: RMS over the mean of the truth", [plain, percent])?;
     let mut front: Vec<(f64, f64)> =
         record.lines.iter().flat_map(|l| &l.points).filter(|p| p.front).map(place).collect();
     front.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -1,5 +1,21 @@
 //! The study's charts as SVG, drawn by a plotting library.
 
+/// Draws the axes of a chart with these words and formats.
+macro_rules! axes {
+    ($chart:expr, $x:expr, $y:expr, [$of_x:expr, $of_y:expr]) => {
+        $chart
+            .configure_mesh()
+            .x_desc($x)
+            .y_desc($y)
+            .label_style(("sans-serif", 13))
+            .axis_desc_style(("sans-serif", 15))
+            .x_label_formatter(&|v| $of_x(*v))
+            .y_label_formatter(&|v| $of_y(*v))
+            .light_line_style(WHITE.mix(0.0))
+            .draw()
+    };
+}
+
 mod heat;
 mod lines;
 mod scatter;

@@ -42,16 +42,7 @@ fn draw(svg: &mut String, found: &Honesty) -> Drawn {
         .x_label_area_size(44)
         .y_label_area_size(84)
         .build_cartesian_2d(range.clone().log_scale(), range.clone().log_scale())?;
-    chart
-        .configure_mesh()
-        .x_desc("true error")
-        .y_desc("stated error")
-        .label_style(("sans-serif", 13))
-        .axis_desc_style(("sans-serif", 15))
-        .x_label_formatter(&|v| percent(*v))
-        .y_label_formatter(&|v| percent(*v))
-        .light_line_style(WHITE.mix(0.0))
-        .draw()?;
+    axes!(chart, "true error", "stated error", [percent, percent])?;
     let line = |factor: f64| [range.start, range.end].map(|x| (x, factor * x));
     chart.draw_series(LineSeries::new(line(1.0), BLACK.stroke_width(2)))?;
     chart.draw_series(LineSeries::new(line(4.0), BLACK.mix(0.3).stroke_width(1)))?;

@@ -44,16 +44,7 @@ fn draw(svg: &mut String, title: &str, findings: &Findings) -> Drawn {
     macro_rules! draw_on {
         ($chart:expr) => {{
             let mut chart = $chart;
-            chart
-                .configure_mesh()
-                .x_desc(findings.of.as_str())
-                .y_desc(findings.quantity.as_str())
-                .label_style(("sans-serif", 13))
-                .axis_desc_style(("sans-serif", 15))
-                .x_label_formatter(&|v| plain(*v))
-                .y_label_formatter(&|v| plain(*v))
-                .light_line_style(WHITE.mix(0.0))
-                .draw()?;
+            axes!(chart, findings.of.as_str(), findings.quantity.as_str(), [plain, plain])?;
             for (i, sweep) in findings.sweeps.iter().enumerate() {
                 let of = |value: fn(&Sample) -> Option<f64>| {
                     sweep.samples.iter().filter_map(|s| Some((s.at, value(s)?))).collect::<Vec<_>>()

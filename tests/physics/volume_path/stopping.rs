@@ -21,14 +21,19 @@ fn own(more: &Value) -> Value {
 }
 
 #[test]
-fn no_pixel_has_fewer_than_16_samples_when_the_error_stops_a_render() {
+fn an_error_stops_no_render_of_fewer_than_16_samples_a_pixel_or_4096_in_all() {
     for technique in ["volume_path", "single_scatter"] {
-        let mut request = scene(technique, &smoke(), &camera(), &own(&json!({})), 48, 1);
-        request["budget"] = json!({"max_error": 10});
-        let resource = House::shared().finish(&request).resource();
-        assert_eq!((&resource["samples"], &resource["stopped_by"]), (&json!(16), &json!("error")), "{technique}");
-        request["budget"] = json!({"max_error": 0.03});
-        let resource = House::shared().finish(&request).resource();
+        let of = |side: u32, most: f64| {
+            let mut request = scene(technique, &smoke(), &camera(), &own(&json!({})), side, 1);
+            request["budget"] = json!({ "max_error": most });
+            House::shared().finish(&request).resource()
+        };
+        // Pictures of 16², 32² and 64² pixels: 4096 samples in all are 16, 4 and 1 of a pixel. A smaller picture needs 16, too.
+        for (side, samples) in [(8, 16), (16, 16), (32, 4), (64, 1)] {
+            let resource = of(side, 10.0);
+            assert_eq!((&resource["samples"], &resource["stopped_by"]), (&json!(samples), &json!("error")), "{side}");
+        }
+        let resource = of(48, 0.03);
         assert!(
             resource["samples"].as_u64().unwrap() > 16 && resource["error"].as_f64().unwrap() <= 0.03,
             "{resource}"
