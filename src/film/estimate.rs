@@ -119,13 +119,15 @@ impl Film {
         }
     }
 
-    /// The square of random noise, whose bound has what no path has met yet, as rare scattering in thin smoke. A path that meets it is taken to change
-    /// its sample by the picture's mean.
+    /// The square of random noise. If none has been seen, its bound has what no path has met yet, as rare scattering in thin smoke. A path that meets it is
+    /// taken to change its sample by the picture's mean.
     fn with_unmet(&self, noise: Estimate) -> Estimate {
+        if noise.value > 0.0 {
+            return noise;
+        }
         let (pixels, count) = (self.main.pixels().max(1) as f64, f64::from(self.main.count.max(1)));
         let mean = self.sums.luminance / pixels;
-        let unmet = UNMET / (pixels * count) * mean * mean / count;
-        Estimate { error: noise.error.max((unmet - noise.value) / UPPER), ..noise }
+        Estimate { value: 0.0, error: UNMET / (pixels * count) * mean * mean / count / UPPER }
     }
 
     /// The upper bound of the noise as a multiple of the deviation within blocks of 2 × 2 pixels, if it is known. Another camera has about the same.

@@ -13,7 +13,7 @@ use crate::device::encode::{EncodeSettings, Encoder, Set};
 use crate::device::{Buffer, Device};
 use crate::error::Result;
 use crate::film::picture::Background;
-use crate::film::{FieldError, Film, Lowered, Planned, Reduced};
+use crate::film::{FieldError, Film, Lowered, Planned};
 use crate::job::SampleCounts;
 use crate::render::Scene;
 use crate::technique::{Random, ViewPlan};
@@ -43,8 +43,6 @@ pub(super) struct Gathered {
     pub probe: Option<Probe>,
     /// The picture of a moving camera, reduced so that it is in time.
     pub moving: Option<Moving>,
-    /// What earlier pictures have shown of one sample per pixel. It stands in until the probe of a moved camera is there.
-    pub expected: Option<Reduced>,
     pub rounds: Rounds,
     /// The kernels' counters.
     pub counts: Buffer,
@@ -99,7 +97,6 @@ impl Gathered {
             layers,
             probe: is_probed.then(probe).transpose()?,
             moving: None,
-            expected: None,
             rounds: Rounds::new(scene.is_pilot()),
             counts: device.upload(&[0; 32], 0)?,
             field_error: None,
@@ -124,7 +121,7 @@ impl Gathered {
         self.layers.iter_mut().try_for_each(|layer| layer.restart(&context.device))?;
         self.probe.iter_mut().for_each(Probe::restart);
         self.rounds.forget();
-        (self.field_error, self.encoded, self.expected) = (None, None, None);
+        (self.field_error, self.encoded) = (None, None);
         Ok(())
     }
 
@@ -228,14 +225,13 @@ impl Gathered {
         let shown = layer(&self.layers, self.moving.as_ref(), pass);
         let sums = self.encoder.encode(&context.device, Set { buffer: &shown.buffer, samples: &main }, &settings)?;
         let twice = if self.stepless { 1.0 } else { 2.0 };
-        let probe = self.probe.as_ref().filter(|_| pass == Pass::Main);
-        let probed_noise = probe.and_then(|probe| probe.noise(context, &self.layers[1]).transpose()).transpose()?;
         let (lowered, reduced) = match (pass, &self.moving) {
             (Pass::Moving, Some(moving)) => (moving.lowered, Some(moving.losses)),
             (Pass::Preview, _) => (Lowered { stride: self.layers[0].stride as u32, step: twice }, None),
-            _ if probe.is_some() && probed_noise.is_none() && main.count == 1 => (Lowered::default(), self.expected),
             _ => (Lowered::default(), None),
         };
+        let probe = self.probe.as_ref().filter(|_| pass == Pass::Main);
+        let probed_noise = probe.and_then(|probe| probe.noise(context, &self.layers[1]).transpose()).transpose()?;
         Ok(Film {
             size: self.size,
             main,

@@ -115,7 +115,8 @@ impl Live {
 
     /// The film so far, with its pixels; `None` if there is nothing yet, or while a pass is under way.
     pub fn film(&mut self, context: &DeviceContext) -> Result<Option<Film>> {
-        let between = self.view.as_mut().filter(|v| v.is_between_passes());
+        // A picture whose error is about to be known waits for it.
+        let between = self.view.as_mut().filter(|v| v.is_between_passes() && !v.owes_probe());
         let gathered = between.map(|v| &mut v.gathered).filter(|g| g.is_something());
         gathered.map(|g| g.film(context)).transpose()
     }

@@ -226,7 +226,6 @@ impl ViewRun {
         let ray_ms = self.ray_ms.or_else(|| context.speed(&self.plan.variant).map(f64::recip));
         let known = ray_ms.map(|ray_ms| motion.least(rays, ray_ms, self.plan.stepless, self.scene.camera()));
         let (lowered, losses) = known.unwrap_or_default();
-        self.gathered.expected = Some(losses);
         let step = self.plan.step;
         self.gathered.will_change();
         let before = self.gathered.moving.take();
