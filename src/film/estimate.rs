@@ -119,8 +119,7 @@ impl Film {
         }
     }
 
-    /// The square of random noise. If none has been seen, its bound has what no path has met yet, as rare scattering in thin smoke. A path that meets it is
-    /// taken to change its sample by the picture's mean.
+    /// The square of random noise. If there is none, its bound has what no path has met yet, which is taken to change a sample by the picture's mean.
     fn with_unmet(&self, noise: Estimate) -> Estimate {
         if noise.value > 0.0 {
             return noise;
@@ -235,7 +234,6 @@ mod tests {
 
     #[test]
     fn what_no_path_has_met_may_still_be_there() {
-        // All samples of a sky have the same luminance.
         let sky = |count: u32, stride: usize| Film {
             noisy: true,
             stepless: true,

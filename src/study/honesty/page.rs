@@ -79,6 +79,8 @@ impl Outcome {
             "moved" => "first picture after a motion",
             _ => "final picture",
         };
-        vec![moment.into(), format!("{size}, {largest}")]
+        let is_coarse = self.warnings.iter().any(|code| code == "coarse_step");
+        let warned = if is_coarse { "warned of a coarse step" } else { "not warned of a coarse step" };
+        vec![moment.into(), format!("{size}, {largest}"), warned.into()]
     }
 }
