@@ -67,7 +67,8 @@ export class Status {
       this.#first = false;
     }
     set('samples', frame.samples === null ? '–' : String(frame.samples));
-    set('error', frame.error === null ? 'not known yet' : this.#error(frame.error, frame.samples));
+    const unknown = frame.final ? 'not known' : 'not known yet';
+    set('error', frame.error === null ? unknown : this.#error(frame.error, frame.samples));
     set('elapsed', milliseconds(frame.elapsedMs));
     set('lowered', frame.lowered ? `Lowered for now: ${frame.lowered}` : '');
     byId('lowered').hidden = !frame.lowered;

@@ -207,6 +207,20 @@ async fn what_a_render_warns_of_stands_on_the_picture() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn an_error_that_is_not_known_has_its_reason() {
+    let page = Page::open(DESKTOP).await;
+    page.settled().await;
+    page.after("a scattering view", page.select("#technique", "single_scatter")).await;
+    page.settled().await;
+    page.find("[data-pointer='/single_scatter/tracking']").await.select_by_label("march").await.expect("the march");
+    page.until("the reason", "document.querySelector('#error-parts').textContent.includes('the bias of fixed steps')")
+        .await;
+    page.settled().await;
+    page.until("the end", "document.querySelector('#error').textContent === 'not known'").await;
+    page.close().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn the_charts_page_shows_what_was_measured() {
     let page = Page::open(DESKTOP).await;
     page.settled().await;

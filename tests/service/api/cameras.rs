@@ -207,5 +207,7 @@ async fn a_field_keeps_its_error_for_another_camera_and_random_paths_do_not_know
         (None, None),
         "two pictures of random paths differ by their own noise"
     );
+    let why = seen["error_parts"]["unknown"].as_str().unwrap_or_default();
+    assert!(why.contains("random paths"), "the reason is named: {}", seen["error_parts"]);
     assert_eq!(seen["stopped_by"], "samples", "what is not known stops nothing");
 }
