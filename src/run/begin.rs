@@ -35,10 +35,7 @@ impl Live {
         self.field.iter_mut().for_each(FieldRun::forget_half);
         self.aim(context, &scene, complete)?;
         match &mut self.view {
-            Some(view) if moves => {
-                view.gathered.field_error = self.motion.field_error;
-                view.hurry(context, &mut self.motion)
-            }
+            Some(view) if moves => view.hurry(context, &mut self.motion),
             _ => Ok(()),
         }
     }
@@ -101,7 +98,8 @@ impl Live {
             })
         });
         let non_finite = prepared.volume().map_or(0, |volume| volume.non_finite());
-        let view = ViewRun::new(context, camera.scene.clone(), prepared, before)?;
+        let mut view = ViewRun::new(context, camera.scene.clone(), prepared, before)?;
+        view.gathered.field_error = self.motion.field_error;
         self.note(&view, non_finite);
         self.view = Some(view);
         let fills = self.field.as_ref().is_some_and(|f| !f.is_over());

@@ -115,13 +115,13 @@ impl Gathered {
         })
     }
 
-    /// Forgets the samples, as for another camera.
+    /// Forgets the samples, as for another camera. The error that the field causes stands until there is another.
     pub fn restart(&mut self, context: &DeviceContext) -> Result<()> {
         context.device.write(&mut self.counts, 0, &[0; 32])?;
         self.layers.iter_mut().try_for_each(|layer| layer.restart(&context.device))?;
         self.probe.iter_mut().for_each(Probe::restart);
         self.rounds.forget();
-        (self.field_error, self.encoded) = (None, None);
+        self.encoded = None;
         Ok(())
     }
 

@@ -73,7 +73,6 @@ impl Live {
             self.learn_losses(context)?;
         }
         let Some(view) = &mut self.view else { return Ok(Turn::Over) };
-        view.gathered.field_error = self.motion.field_error;
         match next(view, self.started, context)? {
             Next::GoOn => self.frame_if_due(context, Pass::Main),
             Next::Refine => view.halve_step(context).map(|()| Turn::Again),
@@ -118,7 +117,7 @@ impl Live {
         match (&mut self.field, &mut self.view) {
             (Some(field), Some(view)) if !view.is_random() => {
                 field.compare_with_half(view.gathered.film(context)?);
-                self.motion.field_error = field.error;
+                (self.motion.field_error, view.gathered.field_error) = (field.error, field.error);
             }
             _ => {}
         }
@@ -128,7 +127,6 @@ impl Live {
     fn leave_snapshot(&mut self, context: &DeviceContext, stopped_by: Option<&'static str>) -> Result<()> {
         let (Some(view), Some(camera)) = (&mut self.view, &self.camera) else { return Ok(()) };
         let field = self.field.as_ref();
-        view.gathered.field_error = self.motion.field_error;
         let film = view.gathered.encode(context)?;
         let device_time = self.earlier_time + view.device_time + field.map_or(Duration::ZERO, |f| f.device_time);
         self.job.leave_snapshot(Snapshot {
