@@ -4,9 +4,6 @@ use super::probed::UPPER;
 use super::stated::{ErrorEstimate, LEAST_STATED, Unknown};
 use super::{Estimate, Film, Planned};
 
-/// The standard errors by which random noise has a margin: it is exceeded once in a hundred pictures. A technique whose error is noise alone would keep a
-/// bound of 95 of 100 as often as not.
-const SURE: f64 = 2.326;
 /// What none of N paths has met happens to less than this over N of them, at 95 % (Hanley & Lippman-Hand, JAMA 249, 1983: the rule of three).
 const UNMET: f64 = 3.0;
 
@@ -114,7 +111,7 @@ impl Film {
             // The squared error of a picture deviates from its own expected value by √(2/ν) of it.
             None => Some(self.with_unmet(Estimate {
                 value: squared,
-                error: if pixels > 0.0 { SURE / UPPER * squared * (2.0 / pixels).sqrt() } else { 0.0 },
+                error: if pixels > 0.0 { squared * (2.0 / pixels).sqrt() } else { 0.0 },
             })),
         }
     }
@@ -184,7 +181,7 @@ mod tests {
         let error = Film { stepless: true, noisy: true, ..film(4, None, None) }.error();
         assert!((error.noise.unwrap_or(f64::NAN) - 0.3).abs() < 1e-12, "{error:?}");
         // Four pixels: the square has a relative standard error of √(2/4).
-        let bound = 0.3 * (1.0 + SURE * 0.5f64.sqrt()).sqrt();
+        let bound = 0.3 * (1.0 + UPPER * 0.5f64.sqrt()).sqrt();
         assert!((error.total.unwrap_or(f64::NAN) - bound).abs() < 1e-12, "{error:?}");
     }
 

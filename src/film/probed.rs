@@ -1,7 +1,8 @@
 //! What a probe tells of a picture: some of its pixels, sampled again with other random numbers and with other steps.
 
-/// The standard errors above an estimate at which 95 of 100 normal variables are not: one-sided.
-pub(super) const UPPER: f64 = 1.645;
+/// The standard errors above an estimate which one in a hundred normal variables exceeds. A margin of 95 of 100 would cover 95 % of the pictures as
+/// often as not, and an estimate from few pixels is not normal: it is low where it has missed what is rare.
+pub(super) const UPPER: f64 = 2.326;
 
 /// An estimate and its standard error.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -13,7 +14,7 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// The upper bound that 95 of 100 estimates keep.
+    /// The upper bound that 99 of 100 estimates keep.
     pub fn upper(&self) -> f64 {
         self.value.max(0.0) + UPPER * self.error
     }

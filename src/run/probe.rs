@@ -113,6 +113,7 @@ impl Probe {
         let set = |&(step, stream): &(Step, u32)| {
             // Of few samples the noise is judged as sparsely as the step is otherwise, and the step of a large picture more sparsely.
             let times = match step {
+                _ if self.steps.is_coarse() => 0,
                 Step::Same => u32::from(!closely),
                 _ => 1 + u32::from(!closely && self.is_large),
             };

@@ -43,6 +43,7 @@ pub use draw::Draw;
 pub use export::{Export, File, OnDevice};
 pub use field::{Field, Look};
 pub use process::{Process, Progress, Step};
+pub(crate) use steps::LONGEST_STEP_VOXELS;
 pub use subject::{AskedField, Subject};
 pub use view::{CellUse, Open, PreparedView, Random, Setting, Settings, View, ViewPlan};
 pub(crate) use view::{TILE, TILES_HEADER};

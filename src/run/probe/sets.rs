@@ -1,5 +1,7 @@
 //! The sets of samples that a probe takes.
 
+use crate::technique::LONGEST_STEP_VOXELS;
+
 /// The samples of the first pass of a set: a point and its turns by quarters are unbiased together.
 const FIRST: u32 = 16;
 /// The most samples of a set that judges the step.
@@ -37,6 +39,11 @@ pub struct Steps {
 }
 
 impl Steps {
+    /// True if a step may pass over what the grid holds. What it misses is rare, and many pixels are to look for it.
+    pub fn is_coarse(&self) -> bool {
+        !self.stepless && f64::from(self.step) > LONGEST_STEP_VOXELS * f64::from(self.smallest_side)
+    }
+
     pub fn of(&self, step: Step) -> f32 {
         match step {
             Step::Same => self.step,
