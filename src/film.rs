@@ -19,7 +19,7 @@ pub use field::FieldError;
 pub use lowered::Lowered;
 use picture::Background;
 pub use probed::{Estimate, ProbePixel, ProbedNoise, ProbedStep, StepPixel};
-pub(crate) use rounds::{Round, is_round, pilot_rounds};
+pub(crate) use rounds::{CLOSELY, FIRST_PROBED, MOST_FOR_STEP, Round, is_round, pilot_rounds, probed_samples};
 pub use stated::{ErrorEstimate, LEAST_STATED, Source, Unknown};
 pub use sums::Sums;
 

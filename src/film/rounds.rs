@@ -14,6 +14,19 @@ pub(crate) fn pilot_rounds() -> impl Iterator<Item = u32> {
         .chain((3..24).flat_map(|octave| (8..16).map(move |eighth| eighth << octave)))
 }
 
+/// The least number of a picture's samples from which its probe looks closely.
+pub(crate) const CLOSELY: u32 = 4;
+/// The samples of the first pass of a probe's set: a point and its turns by quarters are unbiased together.
+pub(crate) const FIRST_PROBED: u32 = 16;
+/// The most samples of a set that judges the step.
+pub(crate) const MOST_FOR_STEP: u32 = 64;
+
+/// The samples of a probe's set beside a picture of `samples` samples, if it may have `most`.
+pub(crate) fn probed_samples(samples: u32, most: u32) -> u32 {
+    let whole = samples.checked_ilog2().map_or(0, |power| 1 << power);
+    FIRST_PROBED.max(most.min(whole))
+}
+
 /// The picture after some samples.
 #[derive(Debug, Clone)]
 pub(crate) struct Round {

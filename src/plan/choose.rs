@@ -1,6 +1,7 @@
 //! The choice of the cheapest candidate that is enough, or of the best that is in time.
 
 use super::calibration::Calibration;
+use super::cost::Cost;
 use super::field_work::FieldWork;
 use super::noise::{Places, SMALL};
 use super::pilot::Pilot;
@@ -62,29 +63,29 @@ pub struct Choice<'a> {
 }
 
 impl Choice<'_> {
-    /// The time of a setting's picture before its first sample, and that of a sample, ms.
-    fn picture_ms(&self, p: &Pilot) -> [f64; 2] {
+    /// The cost of a setting's picture.
+    fn picture(&self, p: &Pilot) -> Cost {
         let technique = p.setting.technique;
         let seen = |q: &&Pilot| q.whole.is_some() && q.setting.technique == technique;
         match (p.whole, self.pilots.iter().find(seen)) {
             (Some(whole), _) => whole,
             // The whole picture was begun with another setting of this technique. This setting costs as much more there as in its pilot.
             (None, Some(Pilot { whole: Some(whole), ms_per_sample, .. })) if *ms_per_sample > 0.0 => {
-                whole.map(|ms| ms * p.ms_per_sample / ms_per_sample)
+                whole.times(p.ms_per_sample / ms_per_sample)
             }
             _ => {
                 let pixels = f64::from(self.image[0]) * f64::from(self.image[1]);
                 let sample = p.ms_per_sample * pixels * self.calibration.factor(technique, pixels);
-                [self.calibration.besides(technique) * sample, sample]
+                Cost { besides: self.calibration.besides(technique) * sample, sample, ..Cost::default() }
             }
         }
     }
 
     /// The device time of an amount, ms.
     pub(super) fn cost(&self, p: &Pilot, amount: Amount) -> f64 {
-        let [besides, sample] = self.picture_ms(p);
-        let field = self.work.zip(amount.work).map_or(0.0, |(work, n)| work.cost(n.amount, besides + sample));
-        field + besides + sample * f64::from(amount.samples)
+        let picture = self.picture(p);
+        let field = self.work.zip(amount.work).map_or(0.0, |(work, n)| work.cost(n.amount, picture.of(1)));
+        field + picture.of(amount.samples)
     }
 
     pub(super) fn error(&self, p: &Pilot, amount: Amount) -> f64 {
@@ -110,14 +111,14 @@ impl Choice<'_> {
 
     /// The best amount that there is time for, if a time is asked for.
     fn in_time(&self, p: &Pilot) -> Option<Amount> {
-        let [besides, sample] = self.picture_ms(p);
-        let samples = |ms: f64| (((ms - besides) / sample).floor().max(1.0) as u32).min(self.most);
+        let picture = self.picture(p);
+        let samples = |ms: f64| picture.samples_in(ms).min(self.most);
         let time = self.target.time_ms?;
         let Some(work) = self.work else { return Some(Amount { samples: samples(time), work: None }) };
-        let left = time - work.cost(0, besides + sample);
+        let left = time - work.cost(0, picture.of(1));
         let split = |part: f64| {
             let n = work.in_time((1.0 - part) * left);
-            Amount { samples: samples(time - work.cost(n, besides + sample)), work: Some(work.of(n)) }
+            Amount { samples: samples(time - work.cost(n, picture.of(1))), work: Some(work.of(n)) }
         };
         parts().map(split).min_by(|a, b| self.error(p, *a).total_cmp(&self.error(p, *b)))
     }

@@ -1,19 +1,26 @@
 //! The findings of the pilots, and a closer look at them if it may decide.
 
+use super::cost::Cost;
 use super::noise::{Places, SMALL, in_common, random};
 use super::pilot::{PIXELS, Pilot, SAMPLES, chance, deviation, lasting};
 use super::reply::Considered;
 use super::run::{Asked, Run, mean};
 use crate::error::{Error, Result};
+use crate::film::CLOSELY;
 use crate::render::region::Region;
 use crate::technique::Setting;
 
-/// The samples of a deeper look, as multiples: of those that are likely to be planned, and at most of those of the look before.
-const DEEPER: [u32; 2] = [8, 16];
+/// The samples of a deeper look, as multiples: of those that are likely to be planned, the same if others judge it, and at most of those of the look
+/// before.
+const DEEPER: u32 = 8;
+const DEEPER_JUDGED: u32 = 4;
+const MUCH_DEEPER: u32 = 16;
 /// The samples of the whole picture with the chosen setting that confirm it, and the samples if one takes long.
 const CONFIRMED: [u32; 2] = [4, 2];
 /// A sample that takes longer than this, ms, takes long. A picture whose first sample takes less is timed once more.
 const SHORT: f64 = 20.0;
+/// The cost of a probe that looks closely, as a multiple of one that does not, of a picture whose samples take long.
+const MORE_CLOSELY: f64 = 4.0;
 /// With fewer pixels that matter than this, a pilot does not tell the error of the places in the picture.
 const FEW: f64 = 200.0;
 /// A pilot does not tell it either if the first samples of the whole picture have an error of the places, squared, that is larger or
@@ -34,7 +41,7 @@ pub struct Found {
     pub reference: Option<[Run; 2]>,
     /// The error of the places in a pixel, from all looks.
     pub places: Places,
-    /// The error of the places as the reference's pilot saw it, over the whole picture.
+    /// The error of the places over the whole picture, as pilots saw it.
     pub everywhere: Places,
     /// The part of the reference's pixels that are opaque.
     pub opaque: f64,
@@ -117,7 +124,11 @@ impl Found {
         let Some((region, part)) = self.part else { return Ok(self.places.clone()) };
         let [a, b] = asked.run_two(setting, region, samples).await?;
         let within = deviation(a.film.random_noise().1);
-        let places = Places::by_two(a.rounds(), b.rounds(), scale / part.sqrt(), within);
+        let mut places = Places::by_two(a.rounds(), b.rounds(), scale / part.sqrt(), within);
+        if asked.is_judged(setting) {
+            let judges = asked.run_judges(setting, region, samples).await?;
+            places.judge([a.rounds(), b.rounds()], judges.each_ref().map(|j| &**j), 0.0, scale / part.sqrt());
+        }
         // Few samples that are good there may be bad elsewhere, as along an edge of another direction.
         Ok(places.at_least(&self.everywhere))
     }
@@ -127,18 +138,25 @@ impl Found {
     /// # Errors
     /// Those of the request.
     pub async fn deepen(&mut self, asked: Asked<'_>, index: usize, samples: u32) -> Result<bool> {
-        let pilot = &self.pilots[index];
+        let Pilot { setting, random, scale, .. } = self.pilots[index].clone();
+        let is_judged = asked.is_judged(&setting);
         let most = asked.planner.limits.max_samples;
-        let deep = (DEEPER[0] * samples).min(DEEPER[1] * self.places.last()).min(most);
-        if self.places.is_known(samples, pilot.random) || deep < SAMPLES {
+        let deeper = samples * if is_judged { DEEPER_JUDGED } else { DEEPER };
+        let deep = deeper.min(MUCH_DEEPER * self.places.last()).min(most);
+        if self.places.is_known(samples, random) || deep < SAMPLES {
             return Ok(false);
         }
+        let region = Region::some(PIXELS, [0, 0], asked.image());
         if self.part.is_some() {
-            self.places = self.look_at_part(asked, &pilot.setting, deep, pilot.scale).await?;
+            self.places = self.look_at_part(asked, &setting, deep, scale).await?;
+        } else if is_judged {
+            let [a, b] = asked.run_two(&setting, region, deep).await?;
+            let judges = asked.run_judges(&setting, region, deep).await?;
+            self.places.judge([a.rounds(), b.rounds()], judges.each_ref().map(|j| &**j), random, scale);
+            self.everywhere = self.places.clone();
         } else {
-            let region = Region::some(PIXELS, [0, 0], asked.image());
-            let run = asked.run(&pilot.setting, region, deep, 1).await?;
-            self.places.look_deeper(run.rounds(), pilot.scale, pilot.random);
+            let run = asked.run(&setting, region, deep, 1).await?;
+            self.places.look_deeper(run.rounds(), scale, random);
         }
         Ok(true)
     }
@@ -151,19 +169,22 @@ impl Found {
     pub async fn confirm(&mut self, asked: Asked<'_>, index: usize) -> Result<bool> {
         let Pilot { setting, ms_per_sample, whole: None, .. } = self.pilots[index].clone() else { return Ok(false) };
         let sample = ms_per_sample * f64::from(asked.image()[0]) * f64::from(asked.image()[1]);
-        let (samples, whole) = (CONFIRMED[usize::from(sample > SHORT)], Region::every(1, asked.image()));
-        let runs = asked.run_two(&setting, whole, samples).await?;
+        let samples = CONFIRMED[usize::from(sample > SHORT)];
+        let runs = [asked.run_whole(&setting, samples, 1).await?, asked.run_whole(&setting, samples, 2).await?];
         let mut ms = [0, 1].map(|i| runs[0].ms[i].min(runs[1].ms[i]));
+        let probe = runs[0].probe_ms.min(runs[1].probe_ms);
+        let mut probe = if samples < CLOSELY { [probe, MORE_CLOSELY * probe] } else { [probe / MORE_CLOSELY, probe] };
         if ms[0] + ms[1] < SHORT {
-            let again = asked.run(&setting, whole, samples, 1).await?;
+            let again = asked.run_whole(&setting, samples, 1).await?;
             ms = [0, 1].map(|i| ms[i].min(again.ms[i]));
+            probe = [asked.run_whole(&setting, 1, 1).await?.probe_ms, probe[1].min(again.probe_ms)];
         }
         // The picture may have millions of pixels: the runtime's other work goes on meanwhile.
         let seen = tokio::task::block_in_place(|| WholePicture::of(&runs, asked.image()));
         let more = if self.pilots[index].random > 0.0 { seen.random / self.pilots[index].random } else { 1.0 };
         self.pilots.iter_mut().filter(|p| p.whole.is_none()).for_each(|p| p.random *= more);
         let pilot = &mut self.pilots[index];
-        (pilot.random, pilot.whole) = (seen.random, Some(ms));
+        (pilot.random, pilot.whole) = (seen.random, Some(Cost { besides: ms[0], sample: ms[1], probe }));
         pilot.chance = chance(seen.matter, seen.matter * f64::from(samples));
         self.look_closer(asked, &setting, &seen).await?;
         Ok(true)

@@ -11,6 +11,7 @@
 
 mod calibration;
 mod choose;
+mod cost;
 pub mod features;
 mod field_work;
 mod found;

@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use super::run::mean;
-use crate::film::Round;
+use crate::film::{Estimate, Round};
 
 /// A part of the variance that is too small to look at more closely.
 pub const SMALL: f64 = 0.1;
@@ -57,6 +57,22 @@ impl Places {
         let steps =
             more.map(|(few, other)| (few.samples, mean(in_common([&a[0], few], [&b[0], other])) / (scale * scale)));
         Self { known: known.collect(), steps: steps.collect(), more: 1.0, within, hopeful: true }
+    }
+
+    /// Takes P² from two renders as above and two `judges`, pictures of the same pixels with places of their own in each pixel: the mean of
+    /// (Iₙ − A) (I′ₙ − B) is P², whatever A and B lack, since that is independent. A picture I_N of the same places is not: of many n, some are wrong as
+    /// it is, and seem to be right.
+    pub fn judge(&mut self, [a, b]: [&[Arc<Round>]; 2], [one, other]: [&Round; 2], random: f64, scale: f64) {
+        // Of many numbers of samples the best is planned, which is the one that is underestimated most: hence a standard error more.
+        let squared = |a: &Round, b: &Round| {
+            let both = in_common([a, one], [b, other]).zip(in_common([a, other], [b, one]));
+            let found = Estimate::mean(both.map(|(p, q)| 0.5 * (p + q)).collect::<Vec<_>>().into_iter());
+            (found.value + found.error).max(0.0) / (scale * scale)
+        };
+        let judged = a.iter().zip(b).map(|(a, b)| Known { samples: a.samples, squared: squared(a, b), random });
+        let last = a.last().map_or(0, |a| a.samples);
+        let further = self.known.iter().copied().filter(|k| k.samples > last);
+        self.known = judged.chain(further).collect();
     }
 
     /// Raises each P² to that of another look after as many samples, if that is larger.
@@ -242,5 +258,26 @@ pub mod tests {
         places.scale(2.0, 0.1);
         assert!((places.squared_after(8.0) / before - 2.2).abs() < 1e-9);
         assert!(places.is_known(128, 0.0025) && !places.is_known(8, 1e-6), "too blurred for what is less random");
+    }
+
+    #[test]
+    fn judges_find_an_error_that_more_samples_share() {
+        // However many samples there are, all pictures of these places are wrong by the same.
+        let shared = |pixel: usize| 0.1 * (pixel as f64 * 1.7).sin();
+        let of = |seed: u32, deviation: f64, shared: &dyn Fn(usize) -> f64| -> Arc<Round> {
+            let mut random = noise(seed);
+            let value = |i: usize| (1.0 + shared(i) + deviation / 0.3 * random()) as f32;
+            Arc::new(Round { samples: 8, device_ms: 0.0, luminance: (0..PIXELS).map(value).collect() })
+        };
+        let [a, b] = [3, 4]
+            .map(|seed| [2, 4, 8].map(|n| Arc::new(Round { samples: n, ..(*of(seed + n, 0.02, &shared)).clone() })));
+        let mut places = Places::by_two(&a, &b, 1.0, 0.0);
+        assert!(places.squared_after(4.0) < 1e-4, "they agree: {}", places.squared_after(4.0));
+        let judges = [20, 21].map(|seed| of(seed, 0.1, &|_| 0.0));
+        places.judge([&a, &b], judges.each_ref().map(|j| &**j), 0.0, 1.0);
+        for n in [2.0, 4.0, 8.0] {
+            let found = places.squared_after(n);
+            assert!((4.5e-3..6e-3).contains(&found), "0.1² / 2, and a little more: {found}");
+        }
     }
 }

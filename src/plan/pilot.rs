@@ -4,6 +4,7 @@
 //! the two is independent and averages to nothing, and the places in a pixel are the same for both. The part of the error that more samples
 //! take away is in `noise`.
 
+use super::cost::Cost;
 use super::noise::Places;
 use super::run::mean;
 use crate::technique::Setting;
@@ -34,8 +35,8 @@ pub struct Pilot {
     pub scale: f64,
     /// The device time of a sample of a pixel, ms.
     pub ms_per_sample: f64,
-    /// The cost of the whole picture besides its samples and the cost of one sample of it, ms, once the picture was begun.
-    pub whole: Option<[f64; 2]>,
+    /// The cost of the whole picture, once it was begun.
+    pub whole: Option<Cost>,
 }
 
 impl Pilot {

@@ -13,6 +13,9 @@ use crate::technique::Setting;
 /// The alpha from which on a pixel counts as opaque.
 const OPAQUE: f32 = 0.99;
 
+/// The least samples of a picture that judges others.
+const LEAST_JUDGES: u32 = 32;
+
 /// A finished pilot render.
 pub struct Run {
     /// The film that it gathered.
@@ -21,6 +24,8 @@ pub struct Run {
     pub pixels: usize,
     /// The device time besides the samples, and that of a sample, ms.
     pub ms: [f64; 2],
+    /// The device time after the last sample, ms: that of its probe.
+    pub probe_ms: f64,
 }
 
 impl Run {
@@ -67,9 +72,40 @@ impl Asked<'_> {
     /// Those of the render.
     pub async fn run(&self, setting: &Setting, region: Region, samples: u32, seed: u64) -> Result<Run> {
         let samples = samples.min(self.planner.limits.max_samples);
+        finish(self.planner, self.with(setting)?.with_seed(seed).into_pilot(region, samples)).await
+    }
+
+    /// Runs the whole picture with a setting, and its probe.
+    ///
+    /// # Errors
+    /// Those of the render.
+    pub async fn run_whole(&self, setting: &Setting, samples: u32, seed: u64) -> Result<Run> {
+        let whole = Region::every(1, self.image());
+        finish(self.planner, self.with(setting)?.with_seed(seed).into_pilot(whole, samples).with_probe()).await
+    }
+
+    fn with(&self, setting: &Setting) -> Result<Scene> {
         // A coarser level may have to be made first: the runtime's other work goes on meanwhile.
-        let scene = tokio::task::block_in_place(|| self.scene.with_setting(setting))?;
-        finish(self.planner, scene.with_seed(seed).into_pilot(region, samples)).await
+        tokio::task::block_in_place(|| self.scene.with_setting(setting))
+    }
+
+    /// True if the samples of a setting are spread evenly, and the pictures of [`Asked::run_judges`] can be had.
+    pub fn is_judged(&self, setting: &Setting) -> bool {
+        setting.view.as_ref().unwrap_or(self.scene.view()).random().is_none()
+    }
+
+    /// Two pictures of a setting with places of their own in each pixel, of half of `samples` or more.
+    ///
+    /// # Errors
+    /// Those of the render.
+    pub async fn run_judges(&self, setting: &Setting, region: Region, samples: u32) -> Result<[Arc<Round>; 2]> {
+        let samples = (samples / 2).max(LEAST_JUDGES).min(self.planner.limits.max_samples);
+        let run = async |seed: u64| {
+            let scene = self.with(setting)?.with_seed(seed).into_pilot(region, samples).with_own_places();
+            let last = finish(self.planner, scene).await?.rounds().last().cloned();
+            last.ok_or_else(|| Error::internal("a pilot without rounds"))
+        };
+        Ok([run(3).await?, run(4).await?])
     }
 
     /// Runs it with two seeds.
@@ -93,7 +129,9 @@ pub async fn finish(planner: &Planner<'_>, pilot: Scene) -> Result<Run> {
     let (Some(first), Some(last)) = (rounds.first(), rounds.last()) else { return Err(failed()) };
     let more = f64::from(last.samples - first.samples);
     let sample = if more > 0.0 { (last.device_ms - first.device_ms) / more } else { first.device_ms };
-    Ok(Run { pixels: film.main.pixels(), ms: [(first.device_ms - sample).max(0.0), sample], film })
+    let all = job.watch().borrow().frame.as_ref().map_or(0.0, |frame| frame.device_ms);
+    let ms = [(first.device_ms - sample).max(0.0), sample];
+    Ok(Run { pixels: film.main.pixels(), ms, probe_ms: (all - last.device_ms).max(0.0), film })
 }
 
 /// Runs a pilot to its end, unseen. If nobody waits for it any more, it is cancelled.

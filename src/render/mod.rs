@@ -3,6 +3,7 @@
 
 mod budget;
 mod export;
+mod pilot;
 pub(crate) mod region;
 mod schema;
 mod shared;
@@ -24,7 +25,7 @@ use crate::technique::{self, Kind, PreparedView, Setting, Subject, Technique, Vi
 use crate::volume::Volume;
 pub use budget::Budget;
 pub use export::{ExportTask, export_schema};
-use region::Region;
+use pilot::Pilot;
 pub use schema::{parameters_schema, schema};
 use shared::{own_parameters, where_it_was_given};
 
@@ -52,7 +53,7 @@ pub struct Scene {
     budget: Budget,
     seed: u64,
     places: u64,
-    pilot: Option<Region>,
+    pilot: Option<Pilot>,
     planned: Option<Planned>,
 }
 
@@ -175,16 +176,6 @@ impl Scene {
         self.camera = camera;
     }
 
-    /// The scene as a pilot: only these pixels of the picture, with this number of samples, and with the pictures after fewer samples.
-    pub(crate) fn into_pilot(self, region: Region, samples: u32) -> Self {
-        Self { pilot: Some(region), budget: Budget { samples, time_ms: None, max_error: None }, ..self }
-    }
-
-    /// The same scene with another seed, but with the same places in a pixel: a pilot's have the picture's error.
-    pub(crate) fn with_seed(self, seed: u64) -> Self {
-        Self { seed, ..self }
-    }
-
     /// The same scene with another subject.
     ///
     /// # Errors
@@ -218,16 +209,6 @@ impl Scene {
     /// The view's own parameters as the request has them, with the shared ones.
     pub(crate) fn given(&self) -> &Map<String, Value> {
         &self.given
-    }
-
-    /// True if it has only some of its pixels, for a planner.
-    pub(crate) fn is_pilot(&self) -> bool {
-        self.pilot.is_some()
-    }
-
-    /// The pixels of the picture that it has: all of them, except for a pilot.
-    pub(crate) fn region(&self) -> Region {
-        self.pilot.unwrap_or(Region::every(1, self.image))
     }
 
     /// The view technique.

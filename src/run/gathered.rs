@@ -7,13 +7,13 @@ use super::context::DeviceContext;
 use super::counts;
 use super::layer::Layer;
 use super::motion::Moving;
-use super::probe::{CLOSELY, Probe, Steps};
+use super::probe::{Probe, Steps};
 use super::rounds::Rounds;
 use crate::device::encode::{EncodeSettings, Encoder, Set};
 use crate::device::{Buffer, Device};
 use crate::error::Result;
 use crate::film::picture::Background;
-use crate::film::{FieldError, Film, Lowered, Planned};
+use crate::film::{CLOSELY, FieldError, Film, Lowered, Planned};
 use crate::job::SampleCounts;
 use crate::render::Scene;
 use crate::technique::{Random, ViewPlan};
@@ -39,7 +39,7 @@ pub(super) struct Gathered {
     pub size: [usize; 2],
     /// The preview, and the layer of the main passes.
     pub layers: [Layer; 2],
-    /// The probe of a picture whose samples are spread evenly. A pilot has none.
+    /// The probe of a picture whose samples are spread evenly. A pilot has none, unless it is to tell what that costs.
     pub probe: Option<Probe>,
     /// The picture of a moving camera, reduced so that it is in time.
     pub moving: Option<Moving>,
@@ -90,7 +90,7 @@ impl Gathered {
         };
         let mut layer = |stride, step, room| Layer::new(device, scene, table(device, step)?, stride, step, 1, room);
         let layers = [layer(sparse, 2.0 * plan.step, of_preview)?, layer(1, plan.step, of_main)?];
-        let is_probed = scene.view().random().is_none() && !scene.is_pilot();
+        let is_probed = scene.view().random().is_none() && scene.is_probed();
         let probe = || Probe::new(device, scene, steps, plan.cheap, |step| table(device, step), of_probe);
         Ok(Self {
             size,

@@ -10,10 +10,10 @@ use super::context::DeviceContext;
 use super::layer::{Batch, Layer};
 use crate::device::{Buffer, Device};
 use crate::error::Result;
-use crate::film::{ProbePixel, ProbedNoise, ProbedStep, StepPixel, luminance};
+use crate::film::{CLOSELY, MOST_FOR_STEP, ProbePixel, ProbedNoise, ProbedStep, StepPixel, luminance};
 use crate::render::Scene;
 pub use sets::Steps;
-use sets::{FINE, KINDS, MOST, MOST_FOR_STEP, QUICK_KINDS, SAME, Set, Step, TWICE};
+use sets::{FINE, KINDS, MOST, QUICK_KINDS, SAME, Set, Step, TWICE};
 
 /// The pixels of a probe along the picture's shorter side, if that has at least so many pixels, or fewer.
 const ALONG: [usize; 2] = [32, 20];
@@ -24,8 +24,6 @@ const ALONG_CHEAP: usize = 96;
 const SPARSE_FROM: usize = 200;
 /// Pixels lie in clusters of two by two. With the samples of a pass they fill a beam of rays that lie close together.
 const CLUSTER: u32 = 1;
-/// The least number of a picture's samples from which the probe looks closely.
-pub(super) const CLOSELY: u32 = 4;
 
 /// The probe of a view whose samples are spread evenly.
 pub(super) struct Probe {

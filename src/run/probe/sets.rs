@@ -1,11 +1,8 @@
 //! The sets of samples that a probe takes.
 
+use crate::film::{FIRST_PROBED, MOST_FOR_STEP, probed_samples};
 use crate::technique::LONGEST_STEP_VOXELS;
 
-/// The samples of the first pass of a set: a point and its turns by quarters are unbiased together.
-const FIRST: u32 = 16;
-/// The most samples of a set that judges the step.
-pub const MOST_FOR_STEP: u32 = 64;
 /// The most samples of a pixel in a pass.
 pub const MOST: u32 = 64;
 /// The longest of the shorter steps, in voxels. What is thinner than a step may be missed by half of it, too.
@@ -73,13 +70,11 @@ impl Set {
 
     /// The samples that it should have beside a picture of `samples` samples.
     pub fn wanted(&self, samples: u32) -> u32 {
-        let whole = if samples == 0 { 0 } else { 1 << samples.ilog2() };
-        let most = if self.step == Step::Same { whole } else { MOST_FOR_STEP };
-        FIRST.max(whole.min(most))
+        probed_samples(samples, if self.step == Step::Same { samples } else { MOST_FOR_STEP })
     }
 
     /// The samples of its next pass. They are the same whenever it is run, so that the error is, too.
     pub fn next(&self) -> u32 {
-        if self.samples == 0 { FIRST } else { self.samples.min(MOST) }
+        if self.samples == 0 { FIRST_PROBED } else { self.samples.min(MOST) }
     }
 }

@@ -91,7 +91,7 @@ impl ViewRun {
             sample: layer.samples as i32,
             held,
             batch: layer.batch.map_or([0; 2], |b| [b.across as i32, b.down as i32]),
-            own_places: layer.batch.is_some().into(),
+            own_places: (layer.batch.is_some() || self.scene.has_own_places()).into(),
             cluster: layer.batch.map_or(0, |b| b.cluster as i32),
             stream: layer.stream,
             offset: self.places.at(layer.samples).to_array(),
