@@ -53,5 +53,5 @@ pub(crate) fn interpolated(interpolations: &[&str], own: &[Value]) -> Vec<Case> 
 /// A tiny request of a view on a built-in of `resolution` voxels a side.
 pub(crate) fn tiny(technique: &str, builtin: &str, resolution: u32, samples: u32, own: &Value) -> Value {
     json!({"technique": technique, "volume": {"builtin": builtin, "resolution": resolution},
-        "image": {"width": 7, "height": 5}, "budget": {"samples": samples}, technique: own})
+        "image": {"width": 5, "height": 3}, "budget": {"samples": samples}, technique: own})
 }

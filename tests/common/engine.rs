@@ -1,5 +1,6 @@
 //! The engine in this process, for tests of the film itself in linear floats.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use clap::Parser;
@@ -63,10 +64,21 @@ impl House {
         self.service.scene(request)
     }
 
-    /// The shared house, with the device's own number of lanes.
+    /// A shared house, with the device's own number of lanes: the same for all of a test. There are a few, since a house does its work on the host, such
+    /// as reading a film, while its device waits.
     pub fn shared() -> &'static Self {
-        static HOUSE: OnceLock<House> = OnceLock::new();
-        HOUSE.get_or_init(|| {
+        static NEXT: AtomicUsize = AtomicUsize::new(0);
+        thread_local!(static OWN: usize = NEXT.fetch_add(1, Ordering::Relaxed) % House::SHARED);
+        Self::shared_at(OWN.with(|own| *own))
+    }
+
+    /// The number of shared houses.
+    pub const SHARED: usize = 2;
+
+    /// One of the shared houses.
+    pub fn shared_at(index: usize) -> &'static Self {
+        static HOUSES: [OnceLock<House>; House::SHARED] = [const { OnceLock::new() }; House::SHARED];
+        HOUSES[index].get_or_init(|| {
             // Its kernels are compiled by processes beside it, on all cores; a part of a test compiles its own.
             let beside = (!super::processes::is_part()).then(|| env!("CARGO_BIN_EXE_cloudchamber").into());
             Self::on(DeviceConfig { compiler: beside, ..DeviceConfig::pocl() })

@@ -4,6 +4,7 @@ mod honesty;
 mod planner;
 mod stated;
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use cloudchamber::study::bench::Bench;
@@ -15,11 +16,15 @@ use cloudchamber::study::{CASES, Scale, study};
 
 use crate::common::engine::House;
 
-/// Calls `work` with the shared engine, one at a time.
+/// Calls `work` with a shared engine, one at a time on each.
 fn on_a_bench(work: impl FnOnce(&Bench)) {
-    static ONE: Mutex<()> = Mutex::new(());
-    let _one_at_a_time = ONE.lock().unwrap_or_else(PoisonError::into_inner);
-    work(&House::shared().bench());
+    static TAKEN: [Mutex<()>; House::SHARED] = [const { Mutex::new(()) }; House::SHARED];
+    static NEXT: AtomicUsize = AtomicUsize::new(0);
+    let turn = NEXT.fetch_add(1, Ordering::Relaxed) % House::SHARED;
+    let free = (0..House::SHARED).find_map(|index| Some((index, TAKEN[index].try_lock().ok()?)));
+    let wait = || (turn, TAKEN[turn].lock().unwrap_or_else(PoisonError::into_inner));
+    let (index, _one_at_a_time) = free.unwrap_or_else(wait);
+    work(&House::shared_at(index).bench());
 }
 
 #[test]

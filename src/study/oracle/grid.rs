@@ -54,15 +54,13 @@ impl Grid {
         let at = ((p / self.half + 1.0) * 0.5 * count - 0.5).clamp(DVec3::ZERO, count - 1.0);
         let low = at.floor().min((count - 2.0).max(DVec3::ZERO));
         let part = at - low;
-        let mut sum = 0.0;
-        for corner in 0..8 {
-            let bit = |axis: usize| corner >> axis & 1;
-            let weight: f64 = (0..3).map(|a| if bit(a) == 1 { part[a] } else { 1.0 - part[a] }).product();
-            if weight > 0.0 {
-                sum += weight * self.value([0, 1, 2].map(|a| low[a] as usize + bit(a)));
-            }
-        }
-        sum
+        let [x, y, z] = low.to_array().map(|n| n as usize);
+        let [right, below, behind] = [x + 1, y + 1, z + 1];
+        let last = self.dims.map(|n| n - 1);
+        let mix = |a: f64, b: f64, part: f64| a + part * (b - a);
+        let along_x = |y: usize, z: usize| mix(self.value([x, y, z]), self.value([right.min(last[0]), y, z]), part.x);
+        let along_y = |z: usize| mix(along_x(y, z), along_x(below.min(last[1]), z), part.y);
+        mix(along_y(z), along_y(behind.min(last[2])), part.z)
     }
 
     fn value(&self, [x, y, z]: [usize; 3]) -> f64 {

@@ -73,8 +73,8 @@ fn what_is_small_thin_or_sharp_is_not_dropped() {
         for (name, request, samples) in [
             ("detail", looked_at(&detail, 0.02), 256),
             ("shell", looked_at(&shell, 0.03), 256),
-            ("peak", peak, 1500),
-            ("lamp", lamp, 1500),
+            ("peak", peak, 600),
+            ("lamp", lamp, 750),
         ] {
             let asked = request["budget"]["max_error"].as_f64().unwrap();
             let error = Truth::of(bench, &request, samples, None).error(bench, &plan(bench, &request).request);
