@@ -107,13 +107,12 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The upper bound of the picture's error that 95 of 100 pictures keep. An error that was asked for and is predicted to be met is one: the study of
-    /// the planner found it met in 109 of 110 scenes (docs/charts/planner.md). Else it is the upper end of the interval. `None` if a part of the error was
-    /// not measured.
+    /// The upper bound of the picture's error that 95 of 100 pictures keep. An error that was asked for and is predicted to be met is one, as the study
+    /// of the planner measures (docs/charts/planner.md). Else it is the upper end of the interval. `None` if a part of the error was not measured.
     pub fn bound(&self, body: &Value) -> Option<f64> {
         let asked = body["budget"]["max_error"].as_f64().filter(|asked| self.error.value <= *asked);
         let [_, most] = self.error.interval;
-        self.is_whole.then(|| asked.map_or(most, |asked| asked.min(most)))
+        self.is_whole.then(|| asked.unwrap_or(most))
     }
 }
 
