@@ -1,10 +1,12 @@
 //! The film on the host: the samples that a view has gathered so far, its estimated error, and the numbers that are read from its pixels.
 
+mod bound;
 mod chance;
 pub mod difference;
 mod estimate;
 mod field;
 mod lowered;
+mod noise;
 pub mod picture;
 mod probed;
 mod rounds;
@@ -14,11 +16,12 @@ mod sums;
 
 use std::sync::Arc;
 
+pub use bound::Estimate;
 pub use chance::by_chance;
 pub use field::FieldError;
 pub use lowered::Lowered;
 use picture::Background;
-pub use probed::{Estimate, ProbePixel, ProbedNoise, ProbedStep, StepPixel};
+pub use probed::{ProbePixel, ProbedNoise, ProbedStep, StepPixel};
 pub(crate) use rounds::{CLOSELY, FIRST_PROBED, MOST_FOR_STEP, Round, is_round, pilot_rounds, probed_samples};
 pub use stated::{ErrorEstimate, LEAST_STATED, Source, Unknown};
 pub use sums::Sums;

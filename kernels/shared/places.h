@@ -5,35 +5,61 @@
 #include "shared/lanes.h"
 #include "shared/rng.h"
 
-// The steps of the R2 sequence, in units of 2^-32.
-#define R2_STEP_U 0xc13fa9a9u
-#define R2_STEP_V 0x91e10da6u
-// Samples before the quarter turns, if all pixels share their places.
-#define FIRST_PLACES 4
+// Sobol's (0, 2)-sequence (USSR Comput. Math. Math. Phys. 7, 1967), each side with a nested uniform scramble (Owen 1995) by a hash: Burley, "Practical
+// Hash-based Owen Scrambling", JCGT 9(4), 2020, with the hash of Vegdahl, "Building a Better LK Hash", 2021. A hash in which each bit depends on lower
+// ones alone is such a scramble of the bits in reverse. In reverse the first side is the number itself, and the second one the sums, modulo 2, of its
+// bits at all places of which Pascal's triangle has an odd number. For packets and for single numbers.
+#define SCRAMBLED_SOBOL(T, POINT, SCRAMBLED) \
+    static inline T SCRAMBLED(T v, T key) { \
+        v ^= v * 0x3d20adeau; \
+        v += key; \
+        v *= (key >> 16) | 1u; \
+        v ^= v * 0x05526c56u; \
+        v ^= v * 0x53a22864u; \
+        v = (v >> 16) | (v << 16); \
+        v = ((v >> 8) & 0x00ff00ffu) | ((v & 0x00ff00ffu) << 8); \
+        v = ((v >> 4) & 0x0f0f0f0fu) | ((v & 0x0f0f0f0fu) << 4); \
+        v = ((v >> 2) & 0x33333333u) | ((v & 0x33333333u) << 2); \
+        return ((v >> 1) & 0x55555555u) | ((v & 0x55555555u) << 1); \
+    } \
+    static inline void POINT(T number, T key_u, T key_v, T *u, T *v) { \
+        *u = SCRAMBLED(number, key_u); \
+        number ^= (number >> 1) & 0x55555555u; \
+        number ^= (number >> 2) & 0x33333333u; \
+        number ^= (number >> 4) & 0x0f0f0f0fu; \
+        number ^= (number >> 8) & 0x00ff00ffu; \
+        *v = SCRAMBLED(number ^ ((number >> 16) & 0xffffu), key_v); \
+    }
+SCRAMBLED_SOBOL(uint, shared_point, shared_scrambled)
+SCRAMBLED_SOBOL(UInt, own_point, own_scrambled)
+
+// The samples whose places are bent, so that the mean after each power of two is the centre.
+#define BENT_FROM 4u
+#define BENT_TO 1024u
 
 // The offset of a sample that all pixels share.
 static inline float2 sample_offset(constant const View *view, uint sample) {
-    if (sample < FIRST_PLACES) return (float2)(view->first_places[2 * sample], view->first_places[2 * sample + 1]);
-    float u = ((float)((sample / 4u * R2_STEP_U + view->place_shift[0]) >> 9) + 0.5f) * 0x1p-24f - 0.5f;
-    float v = ((float)((sample / 4u * R2_STEP_V + view->place_shift[1]) >> 9) + 0.5f) * 0x1p-24f - 0.5f;
-    float2 turned = sample % 4u < 2u ? (float2)(u, v) : (float2)(-v, u);
-    return 0.5f + (sample % 2u ? -turned : turned);
+    uint u, v;
+    shared_point(sample, view->place_keys[0], view->place_keys[1], &u, &v);
+    u ^= view->place_moves[u >> 30], v ^= view->place_moves[4u + (v >> 30)];
+    float2 place = (float2)((float)(u >> 9) + 0.5f, (float)(v >> 9) + 0.5f) * 0x1p-23f;
+    if (sample < BENT_FROM || sample >= BENT_TO) return place;
+    uint octave = clz(BENT_FROM) - clz(sample);
+    float2 bend = (float2)(view->place_bends[2u * octave], view->place_bends[2u * octave + 1u]);
+    return place + bend * place * (1.0f - place);
 }
 
 // Random numbers of places are apart from those of steps and of rays by this dimension.
 #define PLACE_DIMENSION 0x70616365u
 
-// The offset of each lane's sample, if each pixel has a shift of its own: a point of R2 and its turns by quarters.
+// The offset of each lane's sample, if each pixel has places of its own.
 static inline void own_offsets(constant const View *view, UInt pixel, Int sample, Real *x, Real *y) {
     UInt4Lanes ctr = {pixel, (UInt)(0u), (UInt)(PLACE_DIMENSION), (UInt)(view->stream)};
-    UInt4Lanes shift = philox(ctr, view->seed[0], view->seed[1]);
-    UInt group = as_UInt(sample >> 2);
-    Real u = (to_real(as_Int((group * R2_STEP_U + shift.a) >> 9)) + 0.5f) * 0x1p-24f - 0.5f;
-    Real v = (to_real(as_Int((group * R2_STEP_V + shift.b) >> 9)) + 0.5f) * 0x1p-24f - 0.5f;
-    Mask by_quarter = MASK((sample & 2) != 0), opposite = MASK((sample & 1) != 0);
-    Real turned_x = select(u, -v, by_quarter), turned_y = select(v, u, by_quarter);
-    *x = 0.5f + select(turned_x, -turned_x, opposite);
-    *y = 0.5f + select(turned_y, -turned_y, opposite);
+    UInt4Lanes keys = philox(ctr, view->seed[0], view->seed[1]);
+    UInt u, v;
+    own_point(as_UInt(sample), keys.a, keys.b, &u, &v);
+    *x = (to_real(as_Int(u >> 9)) + 0.5f) * 0x1p-23f;
+    *y = (to_real(as_Int(v >> 9)) + 0.5f) * 0x1p-23f;
 }
 
 // The pixel, the sample and the image point, in full-size pixels, of a place in the film of a pass.

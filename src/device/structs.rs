@@ -133,10 +133,12 @@ device_struct! {
         pub cluster: i32,
         /// 1 if each pixel has places of its own, as a probe's.
         pub own_places: i32,
-        /// The shift of the R2 sequence by the seed, in units of 2⁻³².
-        pub place_shift: [u32; 2],
-        /// The places of the first four samples.
-        pub first_places: [f32; 8],
+        /// The keys of the scrambles of both sides, by the seed.
+        pub place_keys: [u32; 2],
+        /// What moves the places in each quarter of both sides, so that the first four are as they should be.
+        pub place_moves: [u32; 8],
+        /// What bends the places of each octave of samples, so that their mean is the centre.
+        pub place_bends: [f32; 16],
         /// The film's number. Each film has random numbers of its own.
         pub stream: u32,
         /// The request's seed.

@@ -1,11 +1,7 @@
 //! The error of a film, estimated from the film itself. docs/error.md has the whole.
 
-use super::probed::UPPER;
 use super::stated::{ErrorEstimate, LEAST_STATED, Unknown};
-use super::{Estimate, Film, Planned};
-
-/// What none of N paths has met happens to less than this over N of them, at 95 % (Hanley & Lippman-Hand, JAMA 249, 1983: the rule of three).
-const UNMET: f64 = 3.0;
+use super::{Film, Planned};
 
 impl Film {
     /// The error, estimated from the samples and the probe.
@@ -71,67 +67,6 @@ impl Film {
         self.relative((self.sums.truncated / self.main.pixels().max(1) as f64).sqrt())
     }
 
-    /// The standard error of the mean over random samples, of luminance, root mean square over the pixels; and the effective number of its
-    /// pixels, (Σ sᵢ²)² / Σ sᵢ⁴.
-    pub(crate) fn random_noise(&self) -> (f64, f64) {
-        let (sum, squares) = (self.sums.noise, self.sums.noise_squares);
-        ((sum / self.main.pixels().max(1) as f64).sqrt(), if squares > 0.0 { sum * sum / squares } else { 0.0 })
-    }
-
-    /// True if the samples are spread better than random ones. Then the pixels' own variances are too large.
-    pub fn is_well_spread(&self) -> bool {
-        let ratio = self.probed_noise.and_then(|noise| noise.of_random);
-        ratio.is_some_and(|ratio| ratio.value + 2.0 * ratio.error < 1.0)
-    }
-
-    /// The square of the noise, and its standard error. It is `None` if it is not known.
-    ///
-    /// The samples of a pixel are spread more evenly than random ones, so their variance is too large. The probe tells by how much: the ratio is
-    /// that of its pixels. One sample has no variance; the variance of blocks of pixels takes its place.
-    fn noise_squared(&self) -> Option<Estimate> {
-        let count = self.main.count;
-        if self.main.stride > 1 {
-            return None;
-        }
-        if let Some(reduced) = self.reduced {
-            return Some(Estimate { value: (reduced.noise? * self.sums.of_blocks()).powi(2), error: 0.0 });
-        }
-        let (random, pixels) = self.random_noise();
-        let squared = random * random;
-        // Of random paths, nothing found yet is not nothing there.
-        if self.noisy && self.sums.luminance == 0.0 {
-            return None;
-        }
-        match self.probed_noise {
-            Some(probed) if count < 2 => Some(probed.squared_of(self.sums.of_blocks().powi(2))),
-            Some(probed) => Some(probed.squared_of(squared)),
-            None if !self.noisy => None,
-            // The mean of a 2×2 block takes a quarter of random noise away.
-            None if count < 2 => Some(self.with_unmet(self.sums.noise_of_blocks())),
-            // The squared error of a picture deviates from its own expected value by √(2/ν) of it.
-            None => Some(self.with_unmet(Estimate {
-                value: squared,
-                error: if pixels > 0.0 { squared * (2.0 / pixels).sqrt() } else { 0.0 },
-            })),
-        }
-    }
-
-    /// The square of random noise. If there is none, its bound has what no path has met yet, which is taken to change a sample by the picture's mean.
-    fn with_unmet(&self, noise: Estimate) -> Estimate {
-        if noise.value > 0.0 {
-            return noise;
-        }
-        let (pixels, count) = (self.main.pixels().max(1) as f64, f64::from(self.main.count.max(1)));
-        let mean = self.sums.luminance / pixels;
-        Estimate { value: 0.0, error: UNMET / (pixels * count) * mean * mean / count / UPPER }
-    }
-
-    /// The upper bound of the noise as a multiple of the deviation within blocks of 2 × 2 pixels, if it is known. Another camera has about the same.
-    pub fn noise_in_blocks(&self) -> Option<f64> {
-        let (noise, blocks) = (self.noise_squared()?.upper().sqrt(), self.sums.of_blocks());
-        Some(if blocks > 0.0 { noise / blocks } else { 1.0 })
-    }
-
     /// An upper bound of what the step costs, of luminance. It is `None` if it is not known.
     fn step_bound(&self) -> Option<f64> {
         if self.biased {
@@ -155,7 +90,8 @@ impl Film {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{ProbedNoise, ProbedStep, Reduced, Samples, Source, Sums};
+    use super::super::bound::UPPER;
+    use super::super::{Estimate, ProbedNoise, ProbedStep, Reduced, Samples, Source, Sums};
     use super::*;
 
     /// A film of 2 × 2 pixels of luminance 0.5 whose `count` samples have a variance of 0.09 each.
@@ -248,8 +184,11 @@ mod tests {
     #[test]
     fn what_cannot_be_seen_is_stated_as_the_least_that_can() {
         let of = |bound: f64, asked: Option<f64>| {
-            let noiseless =
-                ProbedNoise { of_random: Some(Estimate::default()), random: 0.0225, ..ProbedNoise::default() };
+            let noiseless = ProbedNoise {
+                of_random: Some(Estimate::default()),
+                random: Estimate { value: 0.0225, error: 0.0 },
+                ..ProbedNoise::default()
+            };
             let error = Film { asked, ..film(4, Some(noiseless), Some(bound)) }.error();
             (error.total, error.discretisation)
         };
@@ -283,8 +222,12 @@ mod tests {
     #[test]
     fn a_probe_tells_how_well_samples_are_spread() {
         let of = |value, error| Estimate { value, error };
-        let probed =
-            ProbedNoise { squared: of(0.01, 0.001), of_random: Some(of(0.25, 0.0)), random: 0.0225, expected: None };
+        let probed = ProbedNoise {
+            squared: of(0.01, 0.001),
+            of_random: Some(of(0.25, 0.0)),
+            random: Estimate { value: 0.0225, error: 0.0 },
+            expected: None,
+        };
         let error = film(4, Some(probed), Some(0.03)).error();
         assert!((error.noise.unwrap_or(f64::NAN) - 0.15).abs() < 1e-12, "{error:?}");
         assert!((error.total.unwrap_or(f64::NAN) - 0.15f64.hypot(0.06)).abs() < 1e-12, "{error:?}");

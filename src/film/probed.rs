@@ -1,41 +1,6 @@
 //! What a probe tells of a picture: some of its pixels, sampled again with other random numbers and with other steps.
 
-/// The standard errors above an estimate which one in a hundred normal variables exceeds. A margin of 95 of 100 would cover 95 % of the pictures as
-/// often as not, and an estimate from few pixels is not normal: it is low where it has missed what is rare.
-pub(super) const UPPER: f64 = 2.326;
-
-/// An estimate and its standard error.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Estimate {
-    /// The value.
-    pub value: f64,
-    /// Its standard error.
-    pub error: f64,
-}
-
-impl Estimate {
-    /// The upper bound that 99 of 100 estimates keep.
-    pub fn upper(&self) -> f64 {
-        self.value.max(0.0) + UPPER * self.error
-    }
-
-    /// The mean of numbers.
-    pub fn mean(numbers: impl Iterator<Item = f64> + Clone) -> Self {
-        let count = numbers.clone().count().max(1) as f64;
-        let value = numbers.clone().sum::<f64>() / count;
-        let squares: f64 = numbers.map(|x| (x - value).powi(2)).sum();
-        Self { value, error: squares.sqrt() / count }
-    }
-
-    /// The ratio of the sums of two numbers each, if the second is above 0. Its error is that of the ratio estimator (Cochran, "Sampling
-    /// Techniques", 1977, 6.4): √Σ(a − r b)² / Σ b.
-    pub fn ratio(numbers: impl Iterator<Item = [f64; 2]> + Clone) -> Option<Self> {
-        let [a, b] = numbers.clone().fold([0.0; 2], |[a, b], [x, y]| [a + x, b + y]);
-        let value = (b > 0.0).then(|| a / b)?;
-        let squares: f64 = numbers.map(|[x, y]| (x - value * y).powi(2)).sum();
-        Some(Self { value, error: squares.sqrt() / b })
-    }
-}
+use super::bound::{Estimate, UPPER, matter, of_few};
 
 /// The luminance of a pixel of the probe, to judge the noise.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -69,7 +34,7 @@ pub struct ProbedNoise {
     /// The same as a part of [`ProbePixel::random`]; `None` if that is 0 in all pixels.
     pub of_random: Option<Estimate>,
     /// The mean of [`ProbePixel::random`].
-    pub random: f64,
+    pub random: Estimate,
     /// The part of [`ProbePixel::random`] that is the expected square of the noise, whatever this picture's is; `None` if the sets have more samples
     /// than the picture.
     pub expected: Option<f64>,
@@ -113,25 +78,27 @@ impl ProbedNoise {
         let part = 1.0 / per_pixel.max(1.0);
         let own: f64 = pixels.iter().map(within).sum();
         let all = Estimate::mean(pixels.iter().map(squared));
-        let error = |sampled: f64, of: f64| ((1.0 - part) * sampled * sampled + part * own / (of * of)).sqrt();
+        let wider = of_few(matter(pixels.iter().map(squared)));
+        let error = |sampled: f64, of: f64| ((1.0 - part) * (wider * sampled).powi(2) + part * own / (of * of)).sqrt();
         let ratio = Estimate::ratio(pixels.iter().map(|p| [squared(p), p.random]));
-        let random: f64 = pixels.iter().map(|p| p.random).sum();
+        let of_pixels = Estimate::mean(pixels.iter().map(|p| p.random));
+        let random = count * of_pixels.value;
         Self {
             squared: Estimate { error: error(all.error, count), ..all },
             of_random: ratio.map(|ratio| Estimate { error: error(ratio.error, random), ..ratio }),
-            random: random / count,
+            random: Estimate { error: (1.0 - part).sqrt() * of_pixels.error, ..of_pixels },
             expected: (part_of_samples <= 1.0 && random > 0.0)
                 .then(|| pixels.iter().map(between).sum::<f64>() * part_of_samples / random),
         }
     }
 
     /// The square of the noise of a picture whose mean of [`ProbePixel::random`] over all pixels is `random`. The probe may have missed what varies
-    /// most, as edges. If it has seen less than there is, the rest may be as noisy as random samples, the more so the larger it is.
+    /// most, as edges. If it has seen less than there is, by more than chance, the rest may be as noisy as random samples, the more so the larger it is.
     pub fn squared_of(&self, random: f64) -> Estimate {
         let Some(ratio) = self.of_random else {
             return Estimate { error: self.squared.error + random / UPPER, ..self.squared };
         };
-        let missed = (random - self.random).max(0.0);
+        let missed = (random - self.random.value - self.random.error).max(0.0);
         let part = if random > 0.0 { missed / random } else { 0.0 };
         let excess = missed * part * (1.0 - ratio.value.clamp(0.0, 1.0));
         Estimate { value: random * ratio.value, error: random * ratio.error + excess / UPPER }
@@ -216,15 +183,19 @@ mod tests {
         let found = ProbedNoise {
             squared: Estimate { value: 0.01, error: 0.0 },
             of_random: Some(ratio),
-            random: 0.04,
+            random: Estimate { value: 0.04, error: 0.0 },
             expected: None,
         };
         assert!((found.squared_of(0.04).upper() - 0.01).abs() < 1e-12);
         // A picture that varies less than its probe, and one that varies by 0.02 more.
         assert!((found.squared_of(0.02).upper() - 0.005).abs() < 1e-12);
         assert!((found.squared_of(0.06).upper() - (0.015 + 0.75 * 0.02 / 3.0)).abs() < 1e-12);
+        // One that varies by 0.02 more where 0.01 are chance.
+        let uneven = ProbedNoise { random: Estimate { value: 0.04, error: 0.01 }, ..found };
+        assert!((uneven.squared_of(0.06).upper() - (0.015 + 0.75 * 0.01 / 6.0)).abs() < 1e-12);
         // A probe that has seen nothing.
-        let blind = ProbedNoise { of_random: None, random: 0.0, squared: Estimate::default(), expected: None };
+        let blind =
+            ProbedNoise { of_random: None, random: Estimate::default(), squared: Estimate::default(), expected: None };
         assert!((blind.squared_of(0.06).upper() - 0.06).abs() < 1e-12);
     }
 

@@ -16,7 +16,7 @@ pub(crate) fn pilot_rounds() -> impl Iterator<Item = u32> {
 
 /// The least number of a picture's samples from which its probe looks closely.
 pub(crate) const CLOSELY: u32 = 4;
-/// The samples of the first pass of a probe's set: a point and its turns by quarters are unbiased together.
+/// The samples of the first pass of a probe's set: the more evenly they are spread, the closer is the bound of a picture of few samples.
 pub(crate) const FIRST_PROBED: u32 = 16;
 /// The most samples of a set that judges the step.
 pub(crate) const MOST_FOR_STEP: u32 = 64;

@@ -1,10 +1,11 @@
 //! The findings of the pilots, and a closer look at them if it may decide.
 
 use super::cost::Cost;
-use super::noise::{Places, SMALL, in_common, random};
+use super::noise::{Places, SMALL, random};
 use super::pilot::{PIXELS, Pilot, SAMPLES, chance, deviation, lasting};
 use super::reply::Considered;
-use super::run::{Asked, Run, mean};
+use super::run::{Asked, Run};
+use super::whole::WholePicture;
 use crate::error::{Error, Result};
 use crate::film::CLOSELY;
 use crate::render::region::Region;
@@ -28,10 +29,6 @@ const FEW: f64 = 200.0;
 const UNLIKE: f64 = 1.5;
 /// The number of deviations by which that error must exceed chance, besides being large enough to matter.
 const SURE: f64 = 4.0;
-/// The least part of that error that a closer look must cover, and the largest part of the picture that it may cover.
-const PART: f64 = 0.9;
-const MOST: f64 = 0.25;
-
 /// The findings of the pilots.
 #[derive(Default)]
 pub struct Found {
@@ -119,18 +116,32 @@ impl Found {
         self.pilots.iter_mut().for_each(|pilot| pilot.bias += own);
     }
 
-    /// The error of the places in the region that has most of it.
-    async fn look_at_part(&self, asked: Asked<'_>, setting: &Setting, samples: u32, scale: f64) -> Result<Places> {
-        let Some((region, part)) = self.part else { return Ok(self.places.clone()) };
-        let [a, b] = asked.run_two(setting, region, samples).await?;
-        let within = deviation(a.film.random_noise().1);
-        let mut places = Places::by_two(a.rounds(), b.rounds(), scale / part.sqrt(), within);
+    /// Looks at the places in the region that has most of their error.
+    async fn look_at_part(&mut self, asked: Asked<'_>, setting: &Setting, samples: u32, scale: f64) -> Result<()> {
+        let Some((region, part)) = self.part else { return Ok(()) };
+        let (runs, scale) = (asked.run_two(setting, region, samples).await?, scale / part.sqrt());
+        let within = deviation(runs[0].film.random_noise().1);
+        self.places = Places::by_two(runs[0].rounds(), runs[1].rounds(), scale, within);
         if asked.is_judged(setting) {
-            let judges = asked.run_judges(setting, region, samples).await?;
-            places.judge([a.rounds(), b.rounds()], judges.each_ref().map(|j| &**j), 0.0, scale / part.sqrt());
+            self.judge(asked, setting, region, &runs, [0.0, scale]).await?;
         }
         // Few samples that are good there may be bad elsewhere, as along an edge of another direction.
-        Ok(places.at_least(&self.everywhere))
+        self.places.at_least(&self.everywhere);
+        Ok(())
+    }
+
+    /// Has two runs of a region judged by two others with places of their own. J² and what it is relative to are given.
+    async fn judge(
+        &mut self,
+        asked: Asked<'_>,
+        setting: &Setting,
+        region: Region,
+        [a, b]: &[Run; 2],
+        [random, scale]: [f64; 2],
+    ) -> Result<()> {
+        let judges = asked.run_judges(setting, region, a.film.main.count).await?;
+        self.places.judge([a.rounds(), b.rounds()], judges.each_ref().map(|j| &**j), random, scale);
+        Ok(())
     }
 
     /// Measures the error of the places after `samples` of a pilot's setting that are likely to be planned, unless that is known.
@@ -148,11 +159,10 @@ impl Found {
         }
         let region = Region::some(PIXELS, [0, 0], asked.image());
         if self.part.is_some() {
-            self.places = self.look_at_part(asked, &setting, deep, scale).await?;
+            self.look_at_part(asked, &setting, deep, scale).await?;
         } else if is_judged {
-            let [a, b] = asked.run_two(&setting, region, deep).await?;
-            let judges = asked.run_judges(&setting, region, deep).await?;
-            self.places.judge([a.rounds(), b.rounds()], judges.each_ref().map(|j| &**j), random, scale);
+            let runs = asked.run_two(&setting, region, deep).await?;
+            self.judge(asked, &setting, region, &runs, [random, scale]).await?;
             self.everywhere = self.places.clone();
         } else {
             let run = asked.run(&setting, region, deep, 1).await?;
@@ -207,90 +217,8 @@ impl Found {
         if let Some((region, share)) = seen.around.filter(|_| differs) {
             let pixels = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
             self.part = Some((region, pixels(region.size) / pixels(asked.image()) / share));
-            self.places = self.look_at_part(asked, setting, SAMPLES, seen.scale).await?;
+            self.look_at_part(asked, setting, SAMPLES, seen.scale).await?;
         }
         Ok(())
-    }
-}
-
-/// The findings of the first samples of a whole picture, by two seeds.
-struct WholePicture {
-    samples: u32,
-    /// The mean luminance.
-    scale: f64,
-    /// J² of `noise`, relative, and the effective number of its pixels.
-    random: f64,
-    matter: f64,
-    /// The squared difference of the first sample and the last less its random part, relative, and its relative deviation.
-    missed: f64,
-    within: f64,
-    /// The region of most of that difference, from `around`.
-    around: Option<(Region, f64)>,
-}
-
-impl WholePicture {
-    fn of([a, b]: &[Run; 2], image: [u32; 2]) -> Self {
-        let scale = a.scale();
-        let (random, matter) = random(a.rounds(), b.rounds(), scale);
-        let ends = |run: &Run| run.rounds().first().cloned().zip(run.rounds().last().cloned());
-        let missed: Vec<f64> = match (ends(a), ends(b)) {
-            (Some((first, last)), Some((other, another))) => in_common([&first, &last], [&other, &another]).collect(),
-            _ => Vec::new(),
-        };
-        Self {
-            samples: a.film.main.count,
-            scale,
-            random,
-            matter,
-            missed: mean(missed.iter().copied()) / (scale * scale),
-            within: deviation(a.film.random_noise().1),
-            around: around(&missed, image),
-        }
-    }
-}
-
-/// The rectangle around most of the missed squares, and the part of them inside; `None` if that is not a small part of the picture.
-fn around(missed: &[f64], [width, height]: [u32; 2]) -> Option<(Region, f64)> {
-    let total: f64 = missed.iter().sum();
-    let mut order: Vec<usize> = (0..missed.len()).collect();
-    order.sort_by(|a, b| missed[*b].total_cmp(&missed[*a]));
-    let (mut sum, mut least, mut most) = (0.0, [u32::MAX; 2], [0; 2]);
-    for i in order {
-        if sum >= PART * total {
-            break;
-        }
-        sum += missed[i];
-        for (axis, at) in [i as u32 % width, i as u32 / width].into_iter().enumerate() {
-            least[axis] = least[axis].min(at.saturating_sub(1));
-            most[axis] = most[axis].max((at + 2).min([width, height][axis]));
-        }
-    }
-    let size = [0, 1].map(|axis| most[axis].saturating_sub(least[axis]));
-    let small = f64::from(size[0]) * f64::from(size[1]) <= MOST * f64::from(width) * f64::from(height);
-    let inside = |i: usize| {
-        let at = [i as u32 % width, i as u32 / width];
-        (0..2).all(|axis| (least[axis]..most[axis]).contains(&at[axis]))
-    };
-    let share = (0..missed.len()).filter(|i| inside(*i)).map(|i| missed[i]).sum::<f64>() / total;
-    (total > 0.0 && small).then(|| (Region::some(PIXELS, least, size), share.min(1.0)))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_small_lamp_is_found_and_edges_everywhere_are_not_a_part() {
-        let image = [100, 80];
-        let mut missed: Vec<f64> = (0..8000).map(|i| if i % 2 == 0 { 1e-3 } else { -1e-3 }).collect();
-        for (x, y) in [(70, 9), (72, 9), (71, 12)] {
-            missed[y * 100 + x] = 5.0;
-        }
-        let found = around(&missed, image);
-        assert_eq!(found.map(|f| f.0), Some(Region { left_top: [69, 8], size: [5, 6], stride: 1 }));
-        assert!(found.is_some_and(|f| (f.1 - 1.0).abs() < 0.01), "{found:?}");
-        let everywhere: Vec<f64> = (0..8000).map(|i| f64::from(i % 7 == 0)).collect();
-        assert_eq!(around(&everywhere, image), None);
-        assert_eq!(around(&vec![0.0; 8000], image), None);
     }
 }

@@ -3,7 +3,7 @@
 //! A request gives a scene and the error that the picture may have or the time that it may take. The scene's [`features`] give the
 //! `settings` that could do, less those that a bound rules out. A `pilot` of a few thousand pixels of the picture itself measures the cost
 //! and the error of each of the rest here. The planner looks closer at what was `found` if that might be the best, and confirms the likely
-//! setting on the whole picture. `choose` takes the cheapest setting that is enough, or the best that is in time, and gives the reasons in
+//! setting on the `whole` picture. `choose` takes the cheapest setting that is enough, or the best that is in time, and gives the reasons in
 //! `words`. For a field that is yet to be computed, some small fields stand in. They tell the `field_work` that its picture needs.
 //!
 //! The laws of growth are those that the study measured. Random `noise` falls as the root of the samples. The error of the places in a
@@ -20,6 +20,7 @@ mod pilot;
 mod reply;
 mod run;
 mod target;
+mod whole;
 mod words;
 
 use std::sync::Arc;

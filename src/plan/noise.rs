@@ -76,12 +76,11 @@ impl Places {
     }
 
     /// Raises each P² to that of another look after as many samples, if that is larger.
-    pub fn at_least(mut self, other: &Self) -> Self {
+    pub fn at_least(&mut self, other: &Self) {
         for known in &mut self.known {
             let seen = other.known.iter().find(|k| k.samples == known.samples);
             known.squared = seen.map_or(known.squared, |k| k.squared.max(known.squared));
         }
-        self
     }
 
     /// Adds P² from more samples of one setting of which J² is known: |Iₙ − I_N|² = P² + J² (1/n − 1/N).
