@@ -18,7 +18,7 @@ use std::sync::Arc;
 
 pub use bound::Estimate;
 pub use chance::by_chance;
-pub use field::FieldError;
+pub use field::{FieldError, freedom};
 pub use lowered::Lowered;
 use picture::Background;
 pub use probed::{ProbePixel, ProbedNoise, ProbedStep, StepPixel};

@@ -28,7 +28,7 @@ impl FieldError {
 
 /// The degrees of freedom of the mean square of differences: 3 (Σ d²)² / Σ d⁴, which is their number if all are alike and normal, over the number of
 /// pixels that are alike. Of neighbours with a correlation of r these are (1 + r²) / (1 − r²) along a row, and as many along a column.
-fn freedom(apart: &[f64], width: usize) -> f64 {
+pub fn freedom(apart: &[f64], width: usize) -> f64 {
     let sum = |of: &dyn Fn(&f64) -> f64| apart.iter().map(of).sum::<f64>();
     let (squares, fourths) = (sum(&|d| d * d), sum(&|d| d.powi(4)));
     let neighbours: f64 = apart.chunks(width.max(1)).flat_map(|row| row.windows(2)).map(|pair| pair[0] * pair[1]).sum();

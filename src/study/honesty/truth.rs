@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::error::Result;
+use crate::film::{by_chance, freedom};
 use crate::study::bench::{Bench, Reads, block_means};
 use crate::study::field_of;
 use crate::study::measure::measure;
@@ -28,9 +29,9 @@ const SIDE: f64 = 64.0;
 pub struct Judged {
     /// Root mean square over the pixels, less what the truth's own error adds.
     pub error: f64,
-    /// The error of the truth.
+    /// The error that the truth has at most, in 19 of 20 cases.
     pub known_to: f64,
-    /// The truth, and its noise.
+    /// The truth, and the expected noise of it.
     values: Vec<f64>,
     noise: f64,
 }
@@ -76,12 +77,15 @@ pub fn judge(bench: &Bench, truth: &Value, picture: &[f64], most_ms: f64) -> Res
             means.push(block_means(&run.values, size, side));
         }
         let values: Vec<f64> = means[0].iter().zip(&means[1]).map(|(a, b)| 0.5 * (a + b)).collect();
-        // Each of the two is wrong by half of their difference, as their mean is.
+        // Each of the two is wrong by half of their difference, as their mean is. If few pixels have most of it, these may agree by chance.
         let noise = measure(&means[..1], &values)?.rmse;
+        let differences: Vec<f64> = means[0].iter().zip(&means[1]).map(|(a, b)| a - b).collect();
+        let likely =
+            noise * by_chance(freedom(&differences, truth["image"]["width"].as_u64().unwrap_or(1) as usize), 1.0);
         let apart = measure(std::slice::from_ref(&picture.to_vec()), &values)?.rmse;
         let error = (apart.powi(2) - noise.powi(2)).max(0.0).sqrt();
-        let judged = Judged { error, known_to: noise.hypot(by_step), values, noise };
-        let (is_smooth, is_fine) = (noise <= ENOUGH * apart, by_step <= ENOUGH * apart);
+        let judged = Judged { error, known_to: likely.hypot(by_step), values, noise };
+        let (is_smooth, is_fine) = (likely <= ENOUGH * apart, by_step <= ENOUGH * apart);
         if (is_smooth && is_fine) || apart < NOTHING {
             return Ok(Some(judged));
         }

@@ -41,10 +41,8 @@ async fn what_was_measured_is_served_as_numbers_and_as_charts() {
     assert!(number("covered") * 100 >= number("known") * 95, "{honesty}");
     assert!(api.get_json(honesty["href"].as_str().unwrap()).await["parts"][0]["scenes"].is_array());
     let planner = &listed["planner"];
-    assert!(
-        planner["error_met"].as_u64() <= planner["scenes"].as_u64() && planner["scenes"].as_u64() > Some(0),
-        "{planner}"
-    );
+    let [met, scenes] = ["error_met", "scenes"].map(|name| planner[name].as_u64().unwrap());
+    assert!(met <= scenes && met * 100 >= scenes * 95 && scenes >= 90, "{planner}");
     assert!(api.get_json(planner["href"].as_str().unwrap()).await["scenes"].is_array());
     assert!(api.get_json(stability["href"].as_str().unwrap()).await["experiments"].is_array());
     for chart in all {
