@@ -213,25 +213,25 @@ mod tests {
     #[test]
     fn they_see_where_an_edge_is() {
         // The coverage by a straight edge at 360 angles and 41 distances. With n random places, it has a deviation of up to ½/√n.
+        let inside = |[s, c, d]: [f64; 3], x: f64, y: f64| f64::from(u8::from(c * x + s * y < d));
+        let fine = |i: i32| (f64::from(i) + 0.5) / 50.0 - 0.5;
+        let edges = (0..360).flat_map(|angle| {
+            let (s, c) = f64::from(angle).to_radians().sin_cos();
+            (-20..=20).map(move |step| [s, c, f64::from(step) * 0.02])
+        });
+        let covered = |edge| (0..2500).map(|i| inside(edge, fine(i % 50), fine(i / 50))).sum::<f64>() / 2500.0;
+        let edges: Vec<([f64; 3], f64)> = edges.map(|edge| (edge, covered(edge))).collect();
         let wrong = |seed: u64, samples: u32| {
-            let mut squares = 0.0;
-            for angle in 0..360 {
-                let (s, c) = (f64::from(angle).to_radians()).sin_cos();
-                let inside = |x: f64, y: f64, d: f64| f64::from(u8::from(c * x + s * y < d));
-                for step in -20..=20 {
-                    let d = f64::from(step) * 0.02;
-                    let fine = |i: i32| (f64::from(i) + 0.5) / 50.0 - 0.5;
-                    let cells = (0..2500).map(|i| inside(fine(i % 50), fine(i / 50), d));
-                    let truth = cells.sum::<f64>() / 2500.0;
-                    squares += (mean(seed, samples, |x, y| inside(x, y, d)) - truth).powi(2);
-                }
-            }
-            (squares / (360.0 * 41.0)).sqrt()
+            let of_seed = Places::of_seed(seed);
+            let places: Vec<[f64; 2]> = (0..samples).map(|n| (of_seed.at(n).as_dvec2() - 0.5).to_array()).collect();
+            let mean = |edge| places.iter().map(|[x, y]| inside(edge, *x, *y)).sum::<f64>() / f64::from(samples);
+            let squares: f64 = edges.iter().map(|(edge, covered)| (mean(*edge) - covered).powi(2)).sum();
+            (squares / edges.len() as f64).sqrt()
         };
         // On average over seeds. Places that do not depend on the seed may be a little better by luck.
         for (samples, most) in [(4, 0.13), (16, 0.047), (64, 0.0165), (256, 0.006)] {
-            let wrong = (0..8).map(|seed| wrong(seed, samples).powi(2)).sum::<f64>();
-            assert!((wrong / 8.0).sqrt() < most, "{samples}: {}", (wrong / 8.0).sqrt());
+            let wrong = ((0..8).map(|seed| wrong(seed, samples).powi(2)).sum::<f64>() / 8.0).sqrt();
+            assert!(wrong < most, "{samples}: {wrong}");
         }
     }
 }
