@@ -97,7 +97,8 @@ impl ViewRun {
             None => (None, None),
         };
         let bounds = prepared.volume().map_or(*scene.subject().bounds(), |volume| Bounds::from(&**volume));
-        let view = device_view(&scene, &*prepared, &bounds);
+        let places = Places::of_seed(scene.places());
+        let view = device_view(&scene, &*prepared, &bounds, &places);
         let table = |device: &Device, step| table(device, volume.as_deref(), &scene, &*prepared, step);
         let to_the_end = prepared.parameters_to_the_end(scene.camera());
         let smallest = prepared.volume().map_or(bounds.smallest_side(), |volume| volume.smallest_side());
@@ -121,7 +122,7 @@ impl ViewRun {
             slice_length: SliceLength::new(context.device.info(), longest / f64::from(plan.step), speed),
             quick: quick(speed, gathered.size),
             is_followed: false,
-            places: Places::of_seed(scene.places()),
+            places,
             pass_time: Duration::ZERO,
             shortest_slice: Duration::MAX,
             longest,
@@ -152,7 +153,7 @@ impl ViewRun {
     pub fn restart(&mut self, context: &mut DeviceContext, scene: &Scene) -> Result<()> {
         self.scene = scene.clone();
         self.places = Places::of_seed(scene.places());
-        self.view = device_view(scene, &*self.prepared, &self.bounds);
+        self.view = device_view(scene, &*self.prepared, &self.bounds, &self.places);
         context.device.write(&mut self.parameters, 0, &self.prepared.parameters(scene.camera()))?;
         if let (Some(buffer), Some(own)) = (&mut self.to_the_end, self.prepared.parameters_to_the_end(scene.camera())) {
             context.device.write(buffer, 0, &own)?;
@@ -244,13 +245,13 @@ impl ViewRun {
 }
 
 /// The part of the device's view that all passes share.
-fn device_view(scene: &Scene, prepared: &dyn PreparedView, bounds: &Bounds) -> DeviceView {
+fn device_view(scene: &Scene, prepared: &dyn PreparedView, bounds: &Bounds, places: &Places) -> DeviceView {
     let mut view = scene.camera().device_view(scene.image(), scene.region().left_top, bounds);
     view.full_width = scene.image()[0] as i32;
     view.seed = [scene.seed() as u32, (scene.seed() >> 32) as u32];
     view.flat_squared = prepared.volume().map_or(0.0, |volume| flat_squared(volume));
     scene.clip().apply(bounds, &mut view);
-    Places::of_seed(scene.places()).apply(&mut view);
+    places.apply(&mut view);
     prepared.set_shared(scene.camera(), &mut view);
     view
 }
