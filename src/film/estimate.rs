@@ -10,17 +10,14 @@ impl Film {
         let is_whole = self.main.stride == 1;
         let noise = self.noise_squared();
         let discretisation = self.step_bound();
-        // Of random paths the differences of pixels are noise, whose bound has a margin.
-        let of_blocks = || self.with_unmet(sums.noise_of_blocks()).upper().sqrt();
-        let of_fewer = || if self.noisy { of_blocks() } else { sums.of_fewer_pixels() };
-        let resolution = (!is_whole).then(of_fewer);
+        let resolution = self.of_fewer_pixels().filter(|_| !is_whole);
         // A probe whose rays go to their end has measured what is behind the ends of the others.
         let is_measured = self.to_the_end && discretisation.is_some();
         let truncation = (!is_measured).then(|| (sums.truncated / self.main.pixels().max(1) as f64).sqrt());
         // The standard error is that of such pictures, not the error of this one.
         let expected = self.probed_noise.and_then(|p| p.expected).map(|part| self.random_noise().0 * part.sqrt());
         // A render that looks often enough would stop by a lucky estimate: it counts no less. The blocks of a picture of fewer pixels have its noise.
-        let upper = noise.map(|n| n.upper().sqrt().max(expected.unwrap_or(0.0))).or((!is_whole).then_some(0.0));
+        let upper = noise.map(|n| n.upper().sqrt().max(expected.unwrap_or(0.0))).or(resolution.map(|_| 0.0));
         let rest = [resolution, truncation].into_iter().flatten();
         let own = upper.zip(discretisation).map(|(noise, step)| rest.fold(noise.hypot(step), f64::hypot));
         let relative = |absolute: f64| self.relative(absolute);
@@ -43,6 +40,7 @@ impl Film {
     fn unknown(&self, noise: Option<f64>, step: Option<f64>, field: Option<f64>) -> Option<Unknown> {
         match (noise, step, field) {
             (_, None, _) if self.biased => Some(Unknown::Bias),
+            (None, ..) if self.noisy && self.sums.luminance > 0.0 => Some(Unknown::Few),
             (None, ..) if self.noisy => Some(Unknown::Nothing),
             (None, ..) => Some(Unknown::Probe),
             (_, None, _) => Some(Unknown::Step),
@@ -155,14 +153,34 @@ mod tests {
 
     #[test]
     fn a_preview_of_random_paths_has_the_margin_of_few_pixels() {
-        let sums = Sums { luminance: 2.0, blocks: 0.3, block_squares: 0.09, block_count: 1, ..Sums::default() };
+        let sums = Sums { luminance: 2.0, blocks: 0.3, block_squares: 0.03, block_count: 1, ..Sums::default() };
         let main = Samples { width: 2, height: 2, stride: 4, count: 1, ..Samples::default() };
         let of =
             |noisy: bool| Film { size: [8, 8], main: main.clone(), sums, noisy, stepless: true, ..Film::default() };
         let (smooth, random) = (of(false).error().total, of(true).error().total);
         assert!((smooth.unwrap_or(0.0) - 0.3f64.sqrt() / 0.5).abs() < 1e-12, "{smooth:?}");
-        let bound = (0.4 * (1.0 + UPPER * 2f64.sqrt())).sqrt() / 0.5;
-        assert!((random.unwrap_or(0.0) - bound).abs() < 1e-12, "one block: {random:?}, {bound}");
+        let bound = (0.4 * (1.0 + UPPER * (2.0f64 / 3.0).sqrt())).sqrt() / 0.5;
+        assert!((random.unwrap_or(0.0) - bound).abs() < 1e-12, "three blocks: {random:?}, {bound}");
+    }
+
+    #[test]
+    fn a_picture_in_which_hardly_anything_is_found_says_so() {
+        let one = Sums { luminance: 2.0, blocks: 0.3, block_squares: 0.09, block_count: 1, ..Sums::default() };
+        let of = |stride: usize, sums: Sums, noisy: bool| {
+            let main = Samples { width: 2, height: 2, stride, count: 1, ..Samples::default() };
+            let error = Film { size: [8, 8], main, sums, noisy, stepless: true, ..Film::default() }.error();
+            (error.total, error.unknown)
+        };
+        for stride in [1, 4] {
+            assert_eq!(of(stride, one, true), (None, Some(Unknown::Few)), "one block varies");
+            assert_eq!(of(stride, Sums::default(), true), (None, Some(Unknown::Nothing)), "black");
+        }
+        assert_eq!(of(4, Sums::default(), false), (None, Some(Unknown::Probe)), "a black preview");
+        let even = Sums { blocks: 0.0, block_squares: 0.0, ..one };
+        assert!((of(4, even, false).0.unwrap_or(0.0) - (3.0 / 4.0f64).sqrt()).abs() < 1e-12, "an even preview");
+        let reduced = Some(Reduced { step: Some(0.0), noise: Some(0.8) });
+        let black = Film { reduced, sums: Sums::default(), ..film(1, None, None) }.error();
+        assert_eq!((black.total, black.unknown), (None, Some(Unknown::Probe)), "a black picture of a moving camera");
     }
 
     #[test]

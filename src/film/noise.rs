@@ -6,6 +6,9 @@ use super::{CLOSELY, Estimate, Film};
 /// What none of N paths has met happens to less than this over N of them, at 95 % (Hanley & Lippman-Hand, JAMA 249, 1983: the rule of three).
 const UNMET: f64 = 3.0;
 
+/// The least effective number of blocks of pixels whose spread tells the noise.
+const FEW: f64 = 3.0;
+
 impl Film {
     /// The standard error of the mean over random samples, of luminance, root mean square over the pixels; and the effective number of its
     /// pixels, (Σ sᵢ²)² / Σ sᵢ⁴.
@@ -26,7 +29,9 @@ impl Film {
     /// that of its pixels. One sample has no variance; the variance of blocks of pixels takes its place.
     pub(super) fn noise_squared(&self) -> Option<Estimate> {
         let count = self.main.count;
-        if self.main.stride > 1 {
+        // Of random paths, and without a probe, nothing found yet is not nothing there.
+        let is_nothing = self.sums.luminance == 0.0 && (self.noisy || self.reduced.is_some());
+        if self.main.stride > 1 || is_nothing || self.are_few() {
             return None;
         }
         if let Some(reduced) = self.reduced {
@@ -34,10 +39,6 @@ impl Film {
         }
         let (random, pixels) = self.random_noise();
         let squared = random * random;
-        // Of random paths, nothing found yet is not nothing there.
-        if self.noisy && self.sums.luminance == 0.0 {
-            return None;
-        }
         // The squared error of a picture deviates from its own expected value by √(2/ν) of it.
         let error = if pixels > 0.0 { squared * (2.0 / pixels).sqrt() } else { 0.0 };
         let as_random = Estimate { value: squared, error };
@@ -51,6 +52,22 @@ impl Film {
             None if count < 2 => Some(self.with_unmet(self.sums.noise_of_blocks())),
             None => Some(self.with_unmet(as_random)),
         }
+    }
+
+    /// True if so few random paths have found light that their spread says nothing: one sample a pixel, of which fewer than [`FEW`] blocks vary.
+    fn are_few(&self) -> bool {
+        let sums = &self.sums;
+        self.noisy && self.main.count < 2 && sums.blocks > 0.0 && sums.blocks.powi(2) < FEW * sums.block_squares
+    }
+
+    /// A bound of the loss of a picture of fewer pixels than asked for. Of random paths the differences of pixels are noise, whose bound has a margin.
+    /// It is `None` if the picture is black, or of too few paths.
+    pub(super) fn of_fewer_pixels(&self) -> Option<f64> {
+        let loss = match self.noisy {
+            true => self.sums.noise_of_blocks(),
+            false => Estimate { value: self.sums.of_fewer_pixels().powi(2), error: 0.0 },
+        };
+        (self.sums.luminance > 0.0 && !self.are_few()).then(|| self.with_unmet(loss).upper().sqrt())
     }
 
     /// The square of random noise. If there is none, its bound has what no path has met yet, which is taken to change a sample by the picture's mean.

@@ -43,6 +43,9 @@ pub enum Unknown {
     /// Random paths that have found nothing yet.
     #[serde(rename = "no path has found light yet, which does not say that there is none")]
     Nothing,
+    /// Random paths of which too few have found light.
+    #[serde(rename = "too few paths have found light to tell how much there is")]
+    Few,
     /// Samples without a probe.
     #[serde(rename = "the picture's probe is not there yet")]
     Probe,

@@ -91,9 +91,9 @@ impl FieldRun {
     }
 
     /// Compares a picture with the one of half as much work.
-    pub fn compare_with_half(&mut self, film: Film) {
+    pub fn compare_with_half(&mut self, film: Film, extremum: bool) {
         if let Some(half) = &self.half {
-            self.error = FieldError::of(&film, half);
+            self.error = FieldError::of(&film, half, extremum);
         }
         self.half = Some(film);
     }

@@ -135,6 +135,9 @@ fn scrambled(reversed: u32, key: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::device::program::{Source, Variant};
+    use crate::device::structs::DeviceStruct;
+    use crate::device::{Device, DeviceConfig};
 
     const SEEDS: [u64; 3] = [0, 1, u64::MAX];
 
@@ -193,6 +196,51 @@ mod tests {
             let chi_squared: f64 = cells.iter().map(|n| (n - 100.0).powi(2) / 100.0).sum();
             // 255 degrees of freedom have a deviation of 22.6.
             assert!((chi_squared - 255.0).abs() < 100.0, "{number}: {chi_squared}");
+        }
+    }
+
+    /// A kernel that writes the places that kernels see.
+    const PLACES: &str = "#include \"shared/places.h\"
+kernel void places(constant View *view, global float *shared_places, global UInt *own) {
+    uint n = get_global_id(0);
+    float2 place = sample_offset(view, n);
+    shared_places[2 * n] = place.x, shared_places[2 * n + 1] = place.y;
+    UInt u, v;
+    own_point(as_UInt(LANE_IDS) + (UInt)(n * LANES), (UInt)(view->place_keys[0]), (UInt)(view->place_keys[1]), &u, &v);
+    own[2 * n] = u, own[2 * n + 1] = v;
+}
+";
+
+    #[test]
+    fn kernels_have_the_same_places() {
+        let folder = tempfile::tempdir().expect("a folder");
+        std::fs::write(folder.path().join("places.cl"), PLACES).expect("a kernel");
+        let shared = concat!(env!("CARGO_MANIFEST_DIR"), "/kernels/shared");
+        std::os::unix::fs::symlink(shared, folder.path().join("shared")).expect("a link");
+        let (words, structs) = (String::new as fn() -> String, || vec![DeviceView::LAYOUT]);
+        let source = Source { kernel: "places", words, structs, variants: Vec::new, common: 0 };
+        let kernels = Some(folder.path().to_owned());
+        let mut device = Device::open(&DeviceConfig { kernels, strict: true, ..DeviceConfig::pocl() }).expect("PoCL");
+        let variant = Variant::new("places", None, &[]);
+        device.build(&source, &variant).expect("a kernel");
+        let (count, lanes) = (2048, device.info().lanes as usize);
+        let places = Places::of_seed(5);
+        let mut view = DeviceView::default();
+        places.apply(&mut view);
+        let view = device.upload(bytemuck::bytes_of(&view), 0).expect("memory");
+        let buffer = |values: usize| device.allocate(4 * values).expect("memory");
+        // Whole work-groups write past their count.
+        let (of_all, own) = (buffer(2 * (count + 64)), buffer(2 * lanes * (count + 64)));
+        device.run(&variant, &[("view", &view), ("shared_places", &of_all), ("own", &own)], count).expect("a launch");
+        let (mut found, mut points) = (vec![[0.0f32; 2]; count], vec![0u32; 2 * lanes * count]);
+        device.read(&of_all, 0, &mut found).expect("places");
+        device.read(&own, 0, &mut points).expect("points");
+        for (n, place) in (0..).zip(found) {
+            assert!(places.at(n).distance(place.into()) < 1e-6, "{n}: {place:?}, {}", places.at(n));
+        }
+        for n in 0..count * lanes {
+            let point = [0, 1].map(|side| points[(n / lanes * 2 + side) * lanes + n % lanes]);
+            assert_eq!(point, sobol(n as u32, places.keys), "{n}");
         }
     }
 

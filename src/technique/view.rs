@@ -46,6 +46,8 @@ pub struct ViewPlan {
     pub cheap: bool,
     /// True if the method has an error besides noise that is not measured.
     pub biased: bool,
+    /// True if a pixel is the least or the greatest of many values, which noise in these shifts.
+    pub extremum: bool,
     /// The opacity at which a ray ends. The light behind is part of the error.
     pub opacity_threshold: f64,
     /// The reasons for the plan, in words.

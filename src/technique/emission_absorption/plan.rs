@@ -109,6 +109,7 @@ impl Parameters {
             stepless: false,
             cheap: false,
             biased: false,
+            extremum: false,
             opacity_threshold: self.threshold(),
             reasons,
         })

@@ -129,6 +129,7 @@ impl View for Parameters {
             stepless: false,
             cheap: false,
             biased: false,
+            extremum: false,
             opacity_threshold: if self.layered(&surfaces) { OPACITY_THRESHOLD } else { 1.0 },
             reasons,
         };

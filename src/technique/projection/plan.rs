@@ -160,6 +160,7 @@ impl Parameters {
             stepless: self.walked(),
             cheap: false,
             biased: false,
+            extremum: self.peaks(),
             opacity_threshold: 1.0,
             reasons,
         })

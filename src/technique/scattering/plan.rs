@@ -158,6 +158,7 @@ impl View for Scatterer {
             stepless: true,
             cheap: false,
             biased: self.parameters.tracking == Asked::March,
+            extremum: false,
             opacity_threshold: 1.0,
             reasons: vec![why, format!("sigma_t_per_unit: {:.6}, {:.6}, {:.6}", sigma[0], sigma[1], sigma[2])],
         };

@@ -92,6 +92,7 @@ impl View for Parameters {
             stepless: true,
             cheap: true,
             biased: false,
+            extremum: self.mode != Mode::Mean,
             opacity_threshold: 1.0,
             reasons,
         };

@@ -93,6 +93,7 @@ impl View for Parameters {
             stepless: true,
             cheap: false,
             biased: false,
+            extremum: false,
             opacity_threshold: 1.0,
             reasons: vec!["the surface is a root of a quadratic equation".into()],
         };
