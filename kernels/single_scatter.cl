@@ -32,9 +32,9 @@ typedef struct {
     Real density;                // the density of the phase function's direction
 } Sample;
 
-static inline void begin(constant const View *view, constant const Scattering *params, Int column, Int row, Mask fresh, Sample *s) {
+static inline void begin(constant const View *view, constant const Scattering *params, float2 place, Int column, Int row, Mask fresh, Sample *s) {
     Flight *f = &s->flight;
-    CameraFlight camera = begin_camera_flight(view, params, sample_offset(view, f->sample), column, row, fresh, f);
+    CameraFlight camera = begin_camera_flight(view, params, place, column, row, fresh, f);
     s->at = select(s->at, row * view->width + column, fresh);
     s->task = select(s->task, (Int)(0), fresh);
     s->light = select3(s->light, real3((Real)(0.0f), (Real)(0.0f), (Real)(0.0f)), fresh);
@@ -232,15 +232,16 @@ kernel void single_scatter(constant View *view, constant Scattering *params, VOL
     uint steps = 0u, left = steps_left(view->most_steps);
     if (view->resumed) restore(header, &s, &alive, &taken);
     if (view->most_steps) header[0] = 0u;
+    float2 place = sample_offset(view, f->sample);
     while (f->sample < tile.sample + tile.times && left) {
         if (taken < ITEM * ITEM && count_lanes(~alive) >= REFILL) {
             Int column, row;
             Mask fresh = take_pixels(view, tile, alive, &taken, &column, &row);
-            if (any_lane(fresh)) begin(view, params, column, row, fresh, &s);
+            if (any_lane(fresh)) begin(view, params, place, column, row, fresh, &s);
             alive |= fresh;
         }
         if (!any_lane(alive)) {
-            if (taken >= ITEM * ITEM) taken = 0, f->sample++;
+            if (taken >= ITEM * ITEM) taken = 0, place = sample_offset(view, ++f->sample);
             continue;
         }
         Mask over;

@@ -30,10 +30,10 @@ typedef struct {
 } Path;
 
 // Begins a path in each lane of `fresh`, at the next pixels of the tile.
-static inline void begin(constant const View *view, constant const Scattering *params, Int column, Int row, Mask fresh, Path *path,
+static inline void begin(constant const View *view, constant const Scattering *params, float2 place, Int column, Int row, Mask fresh, Path *path,
                          Mask *done) {
     Flight *f = &path->flight;
-    CameraFlight camera = begin_camera_flight(view, params, sample_offset(view, f->sample), column, row, fresh, f);
+    CameraFlight camera = begin_camera_flight(view, params, place, column, row, fresh, f);
     path->at = select(path->at, row * view->width + column, fresh);
     path->light = select3(path->light, real3((Real)(0.0f), (Real)(0.0f), (Real)(0.0f)), fresh);
     path->alpha = select(path->alpha, (Real)(1.0f), fresh);
@@ -183,16 +183,17 @@ kernel void volume_path(constant View *view, constant Scattering *params, VOLUME
     uint steps = 0u, left = steps_left(view->most_steps);
     if (view->resumed) restore(header, &path, &alive, &taken);
     if (view->most_steps) header[0] = 0u;
+    float2 place = sample_offset(view, f->sample);
     while (f->sample < tile.sample + tile.times && left) {
         Mask done = (Mask)(0);
         if (taken < ITEM * ITEM && count_lanes(~alive) >= REFILL) {
             Int column, row;
             Mask fresh = take_pixels(view, tile, alive, &taken, &column, &row);
-            if (any_lane(fresh)) begin(view, params, column, row, fresh, &path, &done);
+            if (any_lane(fresh)) begin(view, params, place, column, row, fresh, &path, &done);
             alive |= fresh;
         }
         if (!any_lane(alive)) {
-            if (taken >= ITEM * ITEM) taken = 0, f->sample++;
+            if (taken >= ITEM * ITEM) taken = 0, place = sample_offset(view, ++f->sample);
             continue;
         }
         Mask over, elsewhere = (Mask)(0);

@@ -56,8 +56,7 @@ impl Film {
 
     /// True if so few random paths have found light that their spread says nothing: one sample a pixel, of which fewer than [`FEW`] blocks vary.
     fn are_few(&self) -> bool {
-        let sums = &self.sums;
-        self.noisy && self.main.count < 2 && sums.blocks > 0.0 && sums.blocks.powi(2) < FEW * sums.block_squares
+        self.noisy && self.main.count < 2 && self.sums.blocks_that_matter() < FEW
     }
 
     /// A bound of the loss of a picture of fewer pixels than asked for. Of random paths the differences of pixels are noise, whose bound has a margin.

@@ -1,6 +1,7 @@
 //! The sums over a film's pixels from which its error is computed. The device works them out (`kernels/encode.cl`).
 
 use super::Estimate;
+use super::bound::of_few;
 
 /// Sums over the samples of a film.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -61,11 +62,16 @@ impl Sums {
     }
 
     /// The square of random noise, from the deviations within blocks: the mean of a block takes a quarter of it away. The effective number of blocks is
-    /// ν = (Σ b)² / Σ b²; that square, and the squared error of the picture, deviate from it by up to √(2/ν) of it.
+    /// ν = (Σ b)² / Σ b²; that square, and the squared error of the picture, deviate from it by up to √(2/ν) of it, with Student's margin if ν is small.
     pub(super) fn noise_of_blocks(&self) -> Estimate {
         let value = self.of_blocks().powi(2) * 4.0 / 3.0;
-        let part = if self.blocks > 0.0 { (2.0 * self.block_squares).sqrt() / self.blocks } else { 0.0 };
-        Estimate { value, error: value * part }
+        let blocks = self.blocks_that_matter();
+        Estimate { value, error: value * of_few(blocks) * (2.0 / blocks).sqrt() }
+    }
+
+    /// The effective number of blocks, ν = (Σ b)² / Σ b²; infinite if none varies.
+    pub(super) fn blocks_that_matter(&self) -> f64 {
+        if self.blocks > 0.0 { self.blocks * self.blocks / self.block_squares } else { f64::INFINITY }
     }
 
     /// A bound of the loss of a film of fewer pixels than the picture: at edges the deviation within blocks is the lesser, on slopes the loss of every
