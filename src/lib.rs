@@ -6,7 +6,7 @@
 //! ```
 //!
 //! The data goes one way, and modules use each other the other way: `command` → `http` → `study` → `service` → `plan` and `run` → `job` → `render`
-//! → `technique` → `scene` → `request` → `config` → `device` → `film` → `frame` → `asset` → `volume` → `error`, never back and never in a circle
+//! → `technique` → `scene` → `request` → `config` → `device` → `film` → `frame` → `asset` → `tomography` → `volume` → `error`, never back and never in a circle
 //! (`tests/service/house.rs`). `docs/architecture.md` walks one request and one field through the files.
 //!
 //! | module | contents |
@@ -28,6 +28,7 @@
 //! | [`film`] | sums on the host: picture and error |
 //! | [`frame`] | picture to PNG or EXR, with its metadata |
 //! | [`asset`] | stored things, by the hash of their content: volumes |
+//! | [`tomography`] | geometry of measurements, phantoms with exact line integrals, filters, a check of data |
 //! | [`volume`] | grids: readers, built-ins |
 //! | [`power_law`] | lines on logarithmic axes |
 //! | [`split_mix`] | random numbers of the host |
@@ -56,4 +57,5 @@ pub mod service;
 pub mod split_mix;
 pub mod study;
 pub mod technique;
+pub mod tomography;
 pub mod volume;

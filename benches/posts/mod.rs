@@ -26,6 +26,7 @@ impl Bench {
     }
 
     /// Uploads a cube of `side` voxels of a type, as large as `size`, and returns its id.
+    #[allow(dead_code, reason = "not every benchmark uploads")]
     pub fn upload(&self, voxels: Vec<u8>, side: usize, voxel: &str, size: f64) -> String {
         let spacing = size / side as f64;
         let query = format!("dims={side},{side},{side}&type={voxel}&spacing={spacing},{spacing},{spacing}");

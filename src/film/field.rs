@@ -5,7 +5,7 @@ use std::f64::consts::SQRT_2;
 use super::{Film, by_chance};
 
 /// The error of a picture by its field, relative.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct FieldError {
     /// The standard error: the change of the picture since the field had half its work.
     pub change: f64,

@@ -20,7 +20,7 @@ use crate::error::{Error, Result};
 use crate::film::{Round, by_chance};
 use crate::render::Scene;
 use crate::render::region::Region;
-use crate::technique::AskedField;
+use crate::technique::{AskedField, Work};
 use crate::volume::Volume;
 
 /// The device time that a small field is to take, ms.
@@ -34,6 +34,7 @@ const ROUNDED: f64 = 0.01;
 /// A field as pilots see it: small fields, and a large one.
 pub struct Simulated {
     asked: AskedField,
+    kind: Work,
     most: u64,
     /// The work of a small field.
     few: u64,
@@ -67,14 +68,14 @@ impl Simulated {
     ///
     /// # Errors
     /// Those of the renders.
-    pub async fn of(planner: &Planner<'_>, scene: &Scene, asked: AskedField) -> Result<Self> {
-        let most = (asked.work.most)(planner.limits);
-        let first = asked.work.first.min(most);
+    pub async fn of(planner: &Planner<'_>, scene: &Scene, asked: AskedField, kind: Work) -> Result<Self> {
+        let most = (kind.most)(planner.limits);
+        let first = kind.first.min(most);
         let (_, ms) = simulate(planner, scene, [first, 1]).await?;
         let few = ((PILOT_MS * first as f64 / ms) as u64).clamp(first, (most / MANY).max(first));
         let work = (MANY * few).min(most);
         let (many, ms) = simulate(planner, scene, [work, 2]).await?;
-        Ok(Self { asked, most, few, many, work, ms })
+        Ok(Self { asked, kind, most, few, many, work, ms })
     }
 
     /// The volume that pilots look at.
@@ -114,13 +115,13 @@ impl Simulated {
         // The pixels of one voxel count as one.
         let alike = (pixels_per_voxel / f64::from(region.stride)).max(1.0).powi(2);
         Ok(FieldWork {
-            of: self.asked.work.of,
+            of: self.kind.of,
             squared,
             chance: by_chance((independent(&apart) / alike).min(freedom(&of_fields)), FIELDS as f64),
             ms: self.line(ms),
             given: self.asked.given,
             most: self.most,
-            looks: self.asked.work.looks,
+            looks: self.kind.looks,
         })
     }
 
@@ -134,7 +135,7 @@ impl Simulated {
 
     /// Puts an amount of work into a request.
     pub fn put_into(&self, request: &mut Value, work: u64) {
-        request["volume"][self.asked.technique][self.asked.work.of] = json!(work);
+        request["volume"][self.asked.technique][self.kind.of] = json!(work);
     }
 }
 
@@ -149,7 +150,20 @@ async fn simulate(planner: &Planner<'_>, scene: &Scene, [work, seed]: [u64; 2]) 
     let Some(asked) = scene.subject().field() else { return Err(Error::internal("there is no field")) };
     let region = Region::some(1.0, [0, 0], scene.image());
     let other = scene.subject().with_field(asked.field.with(work, seed));
-    let pilot = scene.looking_at(other)?.into_pilot(region, 1);
+    computed(planner, scene.looking_at(other)?.into_pilot(region, 1)).await
+}
+
+/// The whole field of a scene, which has no random work.
+///
+/// # Errors
+/// Those of the render.
+pub async fn whole(planner: &Planner<'_>, scene: &Scene) -> Result<Arc<Volume>> {
+    let region = Region::some(1.0, [0, 0], scene.image());
+    Ok(computed(planner, scene.looking_at(scene.subject().clone())?.into_pilot(region, 1)).await?.0)
+}
+
+/// The field of a pilot, and its time on the device, ms.
+async fn computed(planner: &Planner<'_>, pilot: Scene) -> Result<(Arc<Volume>, f64)> {
     let job = to_its_end(planner, pilot).await?;
     let field = job.field().ok_or_else(|| Error::internal("a pilot without its field"))?;
     Ok((field, job.field_ms().max(f64::MIN_POSITIVE)))

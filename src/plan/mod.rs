@@ -167,14 +167,17 @@ impl Planner<'_> {
             with_technique[technique.name] = Value::Object(reply::options(body, &setting));
         }
         let asked = self.scene(&with_technique)?;
-        let simulated = match asked.subject().field() {
-            None => None,
-            Some(field) => Some(Simulated::of(self, &asked, field.clone()).await?),
+        let field = asked.subject().field().cloned();
+        let (simulated, volume) = match field.map(|field| (field.work, field)) {
+            None => (None, None),
+            Some((None, _)) => (None, Some(field_work::whole(self, &asked).await?)),
+            Some((Some(work), field)) => {
+                let simulated = Simulated::of(self, &asked, field, work).await?;
+                let volume = simulated.volume().clone();
+                (Some(simulated), Some(volume))
+            }
         };
-        let scene = match &simulated {
-            Some(simulated) => looking_at(&asked, simulated.volume())?,
-            None => asked.clone(),
-        };
+        let scene = volume.map_or_else(|| Ok(asked.clone()), |volume| looking_at(&asked, &volume))?;
         let view = scene.prepared(None)?;
         let features = Features::of(&scene, &*view);
         Ok(Seen { asked, scene, view, simulated, features, open: body["technique"] == AUTO })

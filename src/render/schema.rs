@@ -10,7 +10,7 @@ use crate::technique::{self, Kind, Technique};
 /// The JSON Schema of a technique's own parameters under `limits`.
 pub fn parameters_schema(technique: &Technique, limits: &Limits) -> Value {
     let mut schema = (technique.schema)().clone();
-    if let Kind::Field { work, .. } = technique.kind {
+    if let Kind::Field { work: Some(work), .. } = technique.kind {
         schema["properties"][work.of]["maximum"] = (work.most)(limits).into();
     }
     schema

@@ -60,13 +60,14 @@ pub(super) fn of_request(
         return Err(Error::internal("the schema permits a field that is not in the list"));
     };
     let field = parse(&within_limits(technique, work, parameters, limits), &format!("/volume/{name}"), assets)?;
-    let given = parameters.get(work.of).and_then(Value::as_u64);
+    let given = work.and_then(|work| parameters.get(work.of)).and_then(Value::as_u64);
     Ok(Subject::of_field(AskedField { field, technique: technique.name, work, given }))
 }
 
 /// The parameters with a default amount of work that the limits permit.
-fn within_limits(technique: &Technique, work: Work, parameters: &Value, limits: &Limits) -> Value {
+fn within_limits(technique: &Technique, work: Option<Work>, parameters: &Value, limits: &Limits) -> Value {
     let mut parameters = parameters.clone();
+    let Some(work) = work else { return parameters };
     let default = (technique.schema)()["properties"][work.of]["default"].as_u64();
     if let (Some(fields), Some(default)) = (parameters.as_object_mut(), default) {
         fields.entry(work.of).or_insert(default.min((work.most)(limits)).into());

@@ -22,6 +22,8 @@ pub(super) struct FieldRun {
     technique: &'static str,
     reasons: Vec<String>,
     is_over: bool,
+    /// True if its work is random.
+    is_random: bool,
     /// The `result` of the reply, as of the last look.
     pub result: Option<Value>,
     /// The picture of half as much work.
@@ -41,13 +43,14 @@ impl FieldRun {
     }
 
     /// Begins a field whose kernels are built.
-    pub fn new(context: &mut DeviceContext, AskedField { field, technique, .. }: &AskedField) -> Result<Self> {
+    pub fn new(context: &mut DeviceContext, AskedField { field, technique, work, .. }: &AskedField) -> Result<Self> {
         Ok(Self {
             process: field.begin(&mut context.device)?,
             bounds: field.bounds(),
             technique,
             reasons: field.reasons(),
             is_over: false,
+            is_random: work.is_some(),
             result: None,
             half: None,
             error: None,
@@ -88,6 +91,16 @@ impl FieldRun {
     /// Forgets the picture of half the work, which is from an old camera. The error that was found from there stands in for the new camera's.
     pub fn forget_half(&mut self) {
         self.half = None;
+    }
+
+    /// True if its work is random, so that its pictures have noise of their own.
+    pub fn is_random(&self) -> bool {
+        self.is_random
+    }
+
+    /// The error of a field without random work: none once it is whole, and not known before.
+    pub fn settle(&mut self) {
+        self.error = self.is_over.then(FieldError::default);
     }
 
     /// Compares a picture with the one of half as much work.

@@ -115,6 +115,10 @@ impl Live {
     /// field's noise is, and are not compared.
     fn compare_with_half(&mut self, context: &DeviceContext) -> Result<()> {
         match (&mut self.field, &mut self.view) {
+            (Some(field), Some(view)) if !field.is_random() => {
+                field.settle();
+                (self.motion.field_error, view.gathered.field_error) = (field.error, field.error);
+            }
             (Some(field), Some(view)) if !view.is_random() => {
                 field.compare_with_half(view.gathered.film(context)?, view.plan().extremum);
                 (self.motion.field_error, view.gathered.field_error) = (field.error, field.error);

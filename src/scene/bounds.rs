@@ -4,6 +4,9 @@ use glam::{DAffine3, DMat3, DVec3};
 
 use crate::volume::Volume;
 
+/// A plane of voxels is a sheet if its depth is less than this part of its other sides.
+const SHEET: f64 = 0.1;
+
 /// A box in the world and its number of cells along each axis. A volume's cells are its voxels; a box without a volume has one cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
@@ -68,9 +71,14 @@ impl Bounds {
     }
 
     /// The direction from the centre to the eye. It shows a patient's face a little from the side and above, and a built-in from the open
-    /// side of the chamber.
+    /// side of the chamber. A single plane of voxels across z, such as a reconstructed one, is seen from +z, with x to the right.
     pub fn direction(&self) -> DVec3 {
-        if self.scan { DVec3::new(-0.55, 1.0, 0.3).normalize() } else { DVec3::new(0.45, 0.32, -1.0).normalize() }
+        let [x, y, z] = std::array::from_fn(|axis| self.dims[axis] as f64 * self.spacing()[axis]);
+        match self.scan {
+            true => DVec3::new(-0.55, 1.0, 0.3).normalize(),
+            false if self.dims[2] == 1 && z < SHEET * x.min(y) => DVec3::Z,
+            false => DVec3::new(0.45, 0.32, -1.0).normalize(),
+        }
     }
 
     /// The distance at which every corner is inside a square picture, with a margin of 4 %.
@@ -102,5 +110,13 @@ mod tests {
         assert_eq!(bounds.spacing(), [4.0, 0.5, 2.0]);
         assert_eq!(bounds.smallest_side(), 0.5);
         assert!((bounds.radius() - 0.5 * (high - low).length()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_sheet_is_seen_from_the_front() {
+        let of =
+            |depth: f64| Bounds::of_corners(DVec3::new(-10.0, -8.0, 0.0), DVec3::new(10.0, 8.0, depth)).direction();
+        assert_eq!(of(1.0), DVec3::Z);
+        assert!(of(2.0).z < 0.0 && of(16.0).z < 0.0);
     }
 }

@@ -28,6 +28,8 @@ pub enum Reads {
     Ledger(&'static [&'static str]),
     /// The mean luminance of the picture.
     Mean,
+    /// The values of the field, voxel by voxel.
+    Field,
 }
 
 /// A finished render as the study sees it.
@@ -176,7 +178,13 @@ impl Bench {
         let film = self.film(&job)?;
         let number = |at: &str| reply.pointer(at).and_then(Value::as_f64).unwrap_or(0.0);
         Ok(Run {
-            values: read(&film, &reply, reads),
+            values: match (reads, job.field()) {
+                (Reads::Field, Some(field)) => {
+                    let values = field.values()?;
+                    (0..field.voxel_count()).map(|i| values.of(i)).collect()
+                }
+                _ => read(&film, &reply, reads),
+            },
             device_ms: number("/timings/device_ms"),
             wall_ms: number("/timings/elapsed_ms"),
             samples: u64::from(film.main.count),
@@ -231,6 +239,8 @@ fn read(film: &Film, reply: &Value, reads: Reads) -> Vec<f64> {
             let value = |n: &&str| reply["result"]["ledger"][*n]["value"].as_f64().unwrap_or(f64::NAN);
             names.iter().map(value).collect()
         }
+        // Without a field there are no values.
+        Reads::Field => Vec::new(),
         Reads::Mean => {
             let n = pixels().len().max(1) as f64;
             vec![pixels().map(luminance).sum::<f64>() / n]

@@ -153,7 +153,7 @@ fn point(bench: &Bench, setting: &Setting, truth: &Truth, scale: Scale) -> Resul
 /// The parameters of a request's field, and of which of them there may be more or less.
 pub(super) fn field_of(request: &mut serde_json::Value) -> Option<(Work, &mut serde_json::Value)> {
     let (technique, work) = technique::fields().find_map(|t| match t.kind {
-        Kind::Field { work, .. } if request["volume"].get(t.name).is_some() => Some((t, work)),
+        Kind::Field { work: Some(work), .. } if request["volume"].get(t.name).is_some() => Some((t, work)),
         _ => None,
     })?;
     request["volume"].get_mut(technique.name).map(|own| (work, own))

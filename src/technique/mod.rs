@@ -6,10 +6,13 @@
 //! solver converged) ends one recording, and the step falls into a part that records and one that learns. A wrong name is found only when
 //! it is played. With the handle both stand in one function, in the order in which they happen.
 
+mod analytic;
+pub mod backprojection;
 mod case;
 mod draw;
 pub mod emission_absorption;
 mod export;
+pub mod fbp;
 mod field;
 pub mod histogram;
 pub mod isosurface;
@@ -51,6 +54,8 @@ pub(crate) use view::{TILE, TILES_HEADER};
 /// Every technique. Adding one is one line.
 pub const ALL: &[Technique] = &[
     emission_absorption::TECHNIQUE,
+    backprojection::TECHNIQUE,
+    fbp::TECHNIQUE,
     histogram::TECHNIQUE,
     isosurface::TECHNIQUE,
     photon_transport::TECHNIQUE,
@@ -109,8 +114,8 @@ pub enum Kind {
     Field {
         /// Makes the field; its parameters may name stored objects.
         parse: fn(&Value, &str, &Assets) -> Result<Arc<dyn Field>>,
-        /// The parameter that sets its amount of work.
-        work: Work,
+        /// The parameter that sets its amount of random work; `None` for a field that is always computed to its end and has no noise of its own.
+        work: Option<Work>,
     },
     /// Turns a subject into a file.
     Export {
@@ -193,4 +198,9 @@ pub fn exports() -> impl Iterator<Item = &'static Technique> {
 /// The fields, in the list's order.
 pub fn fields() -> impl Iterator<Item = &'static Technique> {
     all().filter(|t| matches!(t.kind, Kind::Field { .. }))
+}
+
+/// The fields of random work, in the list's order.
+pub fn random_fields() -> impl Iterator<Item = &'static Technique> {
+    all().filter(|t| matches!(t.kind, Kind::Field { work: Some(_), .. }))
 }

@@ -85,7 +85,7 @@ pub const TECHNIQUE: Technique = Technique {
     cases: cases::cases,
     kind: Kind::Field {
         parse,
-        work: Work { of: "photons", most: |limits| limits.max_photons, first: 20_000, looks: LOOKS_ON_THE_WAY },
+        work: Some(Work { of: "photons", most: |limits| limits.max_photons, first: 20_000, looks: LOOKS_ON_THE_WAY }),
     },
 };
 

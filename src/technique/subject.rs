@@ -24,8 +24,8 @@ pub struct AskedField {
     pub field: Arc<dyn Field>,
     /// The technique's name.
     pub technique: &'static str,
-    /// The parameter that sets its amount of work.
-    pub work: Work,
+    /// The parameter that sets its amount of random work, if it has one.
+    pub work: Option<Work>,
     /// The amount of work in the request, if given.
     pub given: Option<u64>,
 }

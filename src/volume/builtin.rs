@@ -10,7 +10,7 @@
 //! | `smoke` | a seeded fractal puff (see [`smoke`]) | 0, 1 |
 //! | `constant` | 1 | 1, 1 |
 
-mod phantom;
+pub mod phantom;
 pub mod smoke;
 
 pub use phantom::{ELLIPSOIDS, Ellipsoid, shepp_logan_value};

@@ -7,8 +7,10 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod backprojection;
 mod device;
 mod emission_absorption;
+mod fbp;
 mod histogram;
 mod isosurface;
 mod levels;
@@ -19,6 +21,7 @@ mod scales;
 mod single_scatter;
 mod slice;
 mod study;
+mod tomography;
 mod variants;
 mod views;
 mod volume_path;

@@ -150,7 +150,7 @@ fn place(at: &str) -> String {
     // The parts of labels and of densities are a volume's.
     at = at.replace("/labels/", "/density/");
     let shared = technique::all().flat_map(|t| t.shares).map(|section| format!("/{section}/"));
-    let parts = ["/phase".to_owned(), "/attenuation".to_owned()].into_iter().chain(shared);
+    let parts = ["/phase", "/attenuation", "/sinogram"].map(str::to_owned).into_iter().chain(shared);
     let found = parts.filter_map(|part| at.rfind(&part)).max();
     found.filter(|_| !at.contains("/light/")).map_or(at.clone(), |start| at[start..].to_owned())
 }

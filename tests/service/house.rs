@@ -51,7 +51,7 @@ fn opencl_and_unsafe_live_in_device_only() {
 }
 
 /// The layers, in the order of the data: a module uses only modules of later layers. Modules of one layer do not use each other.
-const ORDER: [&[&str]; 18] = [
+const ORDER: [&[&str]; 19] = [
     &["command"],
     &["http"],
     &["study"],
@@ -68,6 +68,7 @@ const ORDER: [&[&str]; 18] = [
     &["film"],
     &["frame", "power_law"],
     &["asset"],
+    &["tomography"],
     &["volume"],
     &["error", "split_mix"],
 ];

@@ -5,6 +5,7 @@ mod chamber;
 mod cloud;
 mod composite;
 mod ellipsoid;
+mod fbp;
 mod half_space;
 mod isosurface;
 pub mod scattering;
@@ -27,4 +28,5 @@ pub const CASES: &[Case] = &[
     composite::CASE,
     ellipsoid::MEAN,
     ellipsoid::XRAY,
+    fbp::CASE,
 ];

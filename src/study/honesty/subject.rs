@@ -31,7 +31,7 @@ impl Subject {
 
     /// A field whose parameters its technique draws.
     pub fn field(bench: &Bench, unit: &mut dyn FnMut() -> f64) -> Result<Self> {
-        let fields: Vec<&Technique> = technique::fields().collect();
+        let fields: Vec<&Technique> = technique::random_fields().collect();
         let field = fields[(unit() * fields.len() as f64) as usize];
         let own = ((field.cases)().draw)(&mut Draw::new(unit, [0.0, 1.0], 1.0));
         let volume = json!({ field.name: own });

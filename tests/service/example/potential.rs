@@ -40,7 +40,7 @@ pub const TECHNIQUE: Technique = Technique {
         tiny: vec![example()],
         ..Cases::default()
     },
-    kind: Kind::Field { parse, work: Work { of: "iterations", most: |_| 100_000, first: 10, looks: 0 } },
+    kind: Kind::Field { parse, work: Some(Work { of: "iterations", most: |_| 100_000, first: 10, looks: 0 }) },
 };
 
 device_struct! {

@@ -1,0 +1,87 @@
+//! The parts of a request that reconstructions share: the sinogram and the grid.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use crate::error::{Error, Result};
+use crate::tomography::{Geometry, GeometryRequest, Phantom, PhantomRequest};
+
+/// The most voxels of a side, and of a grid.
+const MOST_SIDE: usize = 2048;
+const MOST_VOXELS: usize = 1 << 28;
+
+/// What is reconstructed.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SinogramRequest {
+    /// A measurement that is made for it, without noise.
+    #[serde(default)]
+    projection: ProjectionRequest,
+}
+
+/// A measurement.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct ProjectionRequest {
+    /// What is measured.
+    of: Option<OfRequest>,
+    /// Where each bin of each view looks.
+    #[serde(default)]
+    geometry: GeometryRequest,
+}
+
+/// What is measured.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct OfRequest {
+    /// A phantom, whose line integrals are exact. Default: the head of Shepp and Logan.
+    phantom: PhantomRequest,
+}
+
+/// The grid in a request.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GridRequest {
+    /// Voxels along x, y, z. Default: as many as bins along u, u and v.
+    #[schemars(inner(range(min = 1, max = 2048)))]
+    dims: Option<[usize; 3]>,
+    /// Their sides, mm. Default: those of bins.
+    #[schemars(inner(range(min = 1e-6, max = 1e6)))]
+    spacing_mm: Option<[f64; 3]>,
+    /// The grid's centre, mm.
+    #[schemars(inner(range(min = -1e6, max = 1e6)))]
+    center_mm: Option<[f64; 3]>,
+}
+
+impl SinogramRequest {
+    /// The phantom and the geometry.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] with a pointer under `at`.
+    pub(in crate::technique) fn resolve(&self, at: &str) -> Result<(Phantom, Geometry)> {
+        let at = format!("{at}/projection");
+        let geometry = self.projection.geometry.resolve(&format!("{at}/geometry"))?;
+        let phantom = match &self.projection.of {
+            Some(of) => of.phantom.resolve(&format!("{at}/of/phantom"))?,
+            None => Phantom::shepp_logan(),
+        };
+        Ok((phantom, geometry))
+    }
+}
+
+impl GridRequest {
+    /// Voxels, their sides and the centre, mm.
+    ///
+    /// # Errors
+    /// [`Error::TooLarge`] for a grid of too many voxels.
+    pub(in crate::technique) fn resolve(&self, geometry: &Geometry) -> Result<([usize; 3], [f64; 3], [f64; 3])> {
+        let ([u, v], [du, dv]) = (geometry.count(), geometry.spacing_mm());
+        let dims = self.dims.unwrap_or([u.min(MOST_SIDE), u.min(MOST_SIDE), v.min(MOST_SIDE)]);
+        let voxels = dims.iter().fold(1usize, |all, n| all.saturating_mul(*n));
+        if voxels > MOST_VOXELS {
+            let what = format!("a grid of {voxels} voxels");
+            return Err(Error::TooLarge { what, limit: format!("{MOST_VOXELS} voxels") });
+        }
+        Ok((dims, self.spacing_mm.unwrap_or([du, du, dv]), self.center_mm.unwrap_or_default()))
+    }
+}
