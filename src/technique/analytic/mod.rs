@@ -22,6 +22,7 @@ use crate::error::{Error, Result};
 use crate::scene::bounds::Bounds;
 use crate::tomography::{Filter, Geometry, Phantom};
 use process::Run;
+use request::check_voxels;
 pub use request::{GridRequest, SinogramRequest};
 
 /// Zeros before and behind the bins of a row on the device: the widest packet and two more.
@@ -122,6 +123,7 @@ impl Reconstruction {
         let (phantom, geometry) = sinogram.resolve(&format!("{at}/sinogram"))?;
         let (dims, spacing_mm, center_mm) = grid.resolve(&geometry)?;
         let made = Self { technique, phantom, geometry, dims, spacing_mm, center_mm, method };
+        check_voxels(made.computed())?;
         if made.planes_seen() == 0 {
             let permitted = "planes within half a bin of the detector's rows";
             return Err(Error::invalid(

@@ -77,11 +77,20 @@ impl GridRequest {
     pub(in crate::technique) fn resolve(&self, geometry: &Geometry) -> Result<([usize; 3], [f64; 3], [f64; 3])> {
         let ([u, v], [du, dv]) = (geometry.count(), geometry.spacing_mm());
         let dims = self.dims.unwrap_or([u.min(MOST_SIDE), u.min(MOST_SIDE), v.min(MOST_SIDE)]);
-        let voxels = dims.iter().fold(1usize, |all, n| all.saturating_mul(*n));
-        if voxels > MOST_VOXELS {
-            let what = format!("a grid of {voxels} voxels");
-            return Err(Error::TooLarge { what, limit: format!("{MOST_VOXELS} voxels") });
-        }
+        check_voxels(dims)?;
         Ok((dims, self.spacing_mm.unwrap_or([du, du, dv]), self.center_mm.unwrap_or_default()))
     }
+}
+
+/// Refuses more voxels than may be computed.
+///
+/// # Errors
+/// [`Error::TooLarge`].
+pub(super) fn check_voxels(dims: [usize; 3]) -> Result<()> {
+    let voxels = dims.iter().fold(1usize, |all, n| all.saturating_mul(*n));
+    if voxels > MOST_VOXELS {
+        let what = format!("a grid of {voxels} voxels");
+        return Err(Error::TooLarge { what, limit: format!("{MOST_VOXELS} voxels") });
+    }
+    Ok(())
 }

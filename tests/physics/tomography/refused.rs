@@ -36,4 +36,10 @@ fn wrong_reconstructions_are_refused_at_their_field() {
     }
     let large = json!({"technique": "slice", "volume": {"fbp": geometry(json!({"angles_deg": {"count": 60_000}, "detector": {"count": [8000, 8000]}}))}});
     assert!(matches!(House::shared().scene(&large), Err(Error::TooLarge { .. })));
+    // Deblurring takes four times the grid.
+    for (deconvolve, is_refused) in [(false, false), (true, true)] {
+        let own = json!({"deconvolve": deconvolve, "grid": {"dims": [2048, 2048, 32], "spacing_mm": [1, 1, 0.01]}});
+        let found = House::shared().scene(&json!({"technique": "slice", "volume": {"backprojection": own}}));
+        assert_eq!(matches!(found, Err(Error::TooLarge { .. })), is_refused, "{deconvolve}");
+    }
 }
