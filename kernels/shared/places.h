@@ -70,6 +70,7 @@ static inline Spot spot_at(constant const View *view, Int film_column, Int film_
     int across = view->batch[0], down = view->batch[1], cluster = view->cluster, within = (1 << cluster) - 1;
     Int x_number = film_column >> across, y_number = film_row >> down;
     Int column = (x_number >> cluster) * view->stride + (x_number & within), row = (y_number >> cluster) * view->stride + (y_number & within);
+    column += view->origin[0], row += view->origin[1];
     Spot s;
     s.sample = view->sample + (film_column & ((1 << across) - 1)) + ((film_row & ((1 << down) - 1)) << across);
     s.pixel = as_UInt(row * view->full_width + column);

@@ -129,6 +129,8 @@ device_struct! {
         pub held: i32,
         /// The samples of a pixel lie side by side in the film of a probe: 2^`batch[0]` by 2^`batch[1]`.
         pub batch: [i32; 2],
+        /// The pixel of the full image at which the clusters of a probe begin; else 0.
+        pub origin: [i32; 2],
         /// A probe has clusters of 2^`cluster` by 2^`cluster` pixels beside each other, every `stride` pixels.
         pub cluster: i32,
         /// 1 if each pixel has places of its own, as a probe's.

@@ -272,6 +272,12 @@ impl Gathered {
         self.rounds.passed(context, &self.layers[1], device_time)
     }
 
+    /// Prepares the next pass of the probe.
+    pub fn begin_probe(&mut self, context: &DeviceContext) -> Result<()> {
+        let Self { probe, layers, .. } = self;
+        probe.iter_mut().try_for_each(|probe| probe.begin(context, &layers[1]))
+    }
+
     /// Takes over the samples of a pass of the probe.
     pub fn probe_passed(&mut self, context: &DeviceContext) -> Result<()> {
         let Self { probe, layers, .. } = self;

@@ -35,6 +35,8 @@ pub(super) struct Layer {
     pub step: f32,
     /// The number of its random stream.
     pub stream: u32,
+    /// The pixel of the picture at which the grid of a probe begins.
+    pub origin: [usize; 2],
     /// The samples of a pass, if it is a probe's.
     pub batch: Option<Batch>,
     /// The tiles that its passes sample, if the view renders tiles.
@@ -66,8 +68,8 @@ impl Layer {
         };
         let tiling = scene.view().random().map(tiled).transpose()?;
         let buffer = device.allocate_in(room, 20 * films * width * height + PADDING)?;
-        let (samples, stream, batch) = (0, 0, None);
-        Ok(Self { buffer, width, height, stride, picture_stride, samples, table, step, stream, batch, tiling })
+        let (samples, stream, origin, batch) = (0, 0, [0; 2], None);
+        Ok(Self { buffer, width, height, stride, picture_stride, samples, table, step, stream, origin, batch, tiling })
     }
 
     /// Forgets the samples.

@@ -2,6 +2,7 @@
 //! known (`src/film/probed.rs`). It takes its samples after 1, 4, 8, 16, … samples of the picture. A pass takes many samples of each pixel, side by
 //! side in a film of its own, so that the rays of a packet lie close together.
 
+mod origin;
 mod sets;
 
 use std::rc::Rc;
@@ -12,6 +13,7 @@ use crate::device::{Buffer, Device};
 use crate::error::Result;
 use crate::film::{CLOSELY, MOST_FOR_STEP, ProbePixel, ProbedNoise, ProbedStep, StepPixel, luminance};
 use crate::render::Scene;
+use origin::Cells;
 pub use sets::Steps;
 use sets::{FINE, KINDS, MOST, QUICK_KINDS, SAME, Set, Step, TWICE};
 
@@ -154,12 +156,18 @@ impl Probe {
         self.sets[self.at].step != Step::Same
     }
 
-    /// Prepares the next pass beside a picture of `samples` samples.
-    pub fn begin(&mut self, samples: u32) {
+    /// Prepares the next pass beside a picture.
+    pub fn begin(&mut self, context: &DeviceContext, main: &Layer) -> Result<()> {
+        let samples = main.samples;
         if self.closely != (samples >= CLOSELY) {
             self.begin_stage(samples >= CLOSELY);
         }
-        let Some(at) = self.next(samples) else { return };
+        let Some(at) = self.next(samples) else { return Ok(()) };
+        if let (Some(first), true) = (self.set(SAME[0]), self.sets.iter().all(|set| set.samples == 0)) {
+            let (side, sparse) = (self.stride >> self.cluster, first.sparse);
+            let cells = Cells { side, cluster: self.cluster, count: self.clusters, sparse };
+            self.layer.origin = cells.origin(context, main)?;
+        }
         let [width, height] = self.pixels(&self.sets[at]);
         let (set, layer) = (&self.sets[at], &mut self.layer);
         let power = set.next().trailing_zeros();
@@ -170,6 +178,7 @@ impl Probe {
         table.into_iter().for_each(|(_, table)| layer.table = table.clone());
         (layer.step, layer.samples, layer.stream) = (self.steps.of(set.step), set.samples, set.stream);
         self.at = at;
+        Ok(())
     }
 
     /// Takes over the samples of a pass. Once it has all that judge the step, it does so.
@@ -240,10 +249,11 @@ impl Probe {
     /// Of one sample it is the variance of the cluster.
     fn picture(&self, context: &DeviceContext, main: &Layer, set: &Set) -> Result<Vec<[f64; 2]>> {
         let ([width, height], stride) = (self.pixels(set), self.stride * set.sparse);
+        let [column, line] = self.layer.origin;
         let rows = |from: usize, channels: usize| -> Result<Vec<f32>> {
             let (row, mut all) = (4 * channels * main.width, Vec::new());
             for within in 0..1 << self.cluster {
-                let from = from + within * row;
+                let from = from + (line + within) * row;
                 all.push(context.device.read_rows(
                     &main.buffer,
                     from,
@@ -259,7 +269,7 @@ impl Probe {
         let n = f64::from(main.samples);
         let at = |x: usize, y: usize| {
             let row = y % (1 << self.cluster) * (height >> self.cluster) + (y >> self.cluster);
-            row * main.width + (x >> self.cluster) * stride + x % (1 << self.cluster)
+            row * main.width + column + (x >> self.cluster) * stride + x % (1 << self.cluster)
         };
         let of_cluster = |x: usize, y: usize| {
             let side = 1 << self.cluster;

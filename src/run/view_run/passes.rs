@@ -71,8 +71,8 @@ impl ViewRun {
             // The counts are of the picture, not of its preview.
             context.device.write(&mut self.gathered.counts, 0, &[0; 32])?;
         }
-        if let (Pass::Probe, Some(probe)) = (pass, &mut self.gathered.probe) {
-            probe.begin(samples);
+        if pass == Pass::Probe {
+            self.gathered.begin_probe(context)?;
         }
         self.pass_view = self.view_of(self.gathered.layer(pass));
         self.pass = Some(pass);
@@ -92,6 +92,7 @@ impl ViewRun {
             held,
             batch: layer.batch.map_or([0; 2], |b| [b.across as i32, b.down as i32]),
             own_places: (layer.batch.is_some() || self.scene.has_own_places()).into(),
+            origin: layer.origin.map(|n| (n * (layer.picture_stride / layer.stride)) as i32),
             cluster: layer.batch.map_or(0, |b| b.cluster as i32),
             stream: layer.stream,
             offset: self.places.at(layer.samples).to_array(),
