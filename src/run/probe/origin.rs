@@ -1,6 +1,7 @@
 //! Where the grid of a probe begins in the picture. A grid that passes over what varies would say nothing of it.
 
 use crate::error::Result;
+use crate::film::luminance;
 use crate::run::context::DeviceContext;
 use crate::run::layer::Layer;
 
@@ -48,7 +49,7 @@ impl Cells {
             context.device.read(&main.buffer, first + 4 * channels * row * from, band)?;
             for (y, pixels) in (from..).zip(band.chunks(channels * row)) {
                 for (light, rgba) in light.iter_mut().zip(pixels.chunks_exact(4)).filter(|_| is_light) {
-                    *light = 0.2126 * rgba[0] + 0.7152 * rgba[1] + 0.0722 * rgba[2];
+                    *light = luminance(rgba) as f32;
                 }
                 self.variances(if is_light { &light } else { pixels }, is_light, &mut variances);
                 self.add(y, &variances, &mut columns);
