@@ -45,6 +45,19 @@ impl Estimate {
         let squares: f64 = numbers.map(|[x, y]| (x - value * y).powi(2)).sum();
         Some(Self { value, error: squares.sqrt() / b })
     }
+
+    /// The mean of the first of two numbers each over all there are, where the mean of the second is 1: the linear regression estimator (Cochran, 7.1),
+    /// ȳ + b (1 − x̄) with b = Σ(x − x̄) y / Σ(x − x̄)², and error √(Σ e² / (n (n − 2))). The first numbers are not negative: b is kept from 0, which is
+    /// their mean, to ȳ / x̄, which is their ratio.
+    pub(super) fn regressed(numbers: impl Iterator<Item = [f64; 2]> + Clone) -> Self {
+        let count = numbers.clone().count().max(1) as f64;
+        let [y, x] = numbers.clone().fold([0.0; 2], |[y, x], [v, u]| [y + v / count, x + u / count]);
+        let [both, square] =
+            numbers.clone().fold([0.0; 2], |[b, s], [v, u]| [b + (u - x) * (v - y), s + (u - x).powi(2)]);
+        let slope = if square > 0.0 && x > 0.0 { (both / square).clamp(0.0, y.max(0.0) / x) } else { 0.0 };
+        let squares: f64 = numbers.map(|[v, u]| (v - y - slope * (u - x)).powi(2)).sum();
+        Self { value: y + slope * (1.0 - x), error: (squares / (count * (count - 2.0).max(1.0))).sqrt() }
+    }
 }
 
 /// The effective number of pixels that matter, (Σ |x|)² / Σ x².
@@ -75,5 +88,20 @@ mod tests {
         assert!(of_few(1e4) < 1.001 && (of_few(f64::INFINITY) - 1.0).abs() < 1e-12);
         let wide = Estimate { value: 1.0, error: 5.0 };
         assert!((wide.at_most(3.0).upper() - 3.0).abs() < 1e-12 && (wide.at_most(0.5).upper() - 1.0).abs() < 1e-12);
+    }
+    #[test]
+    fn a_regression_takes_from_the_mean_what_the_choice_of_the_pixels_added() {
+        // Pixels that vary three times as much as the picture's do.
+        let x = [0.0, 3.0, 6.0, 3.0, 0.0, 6.0];
+        let of = |y: [f64; 6]| Estimate::regressed(y.into_iter().zip(x).map(|(y, x)| [y, x]));
+        let (proportional, even) = (of(x.map(|x| 0.5 * x)), of([2.0; 6]));
+        assert!((proportional.value - 0.5).abs() < 1e-12 && proportional.error < 1e-12, "{proportional:?}");
+        assert!((even.value - 2.0).abs() < 1e-12 && even.error < 1e-12, "{even:?}");
+        // 1 + x / 2, and what falls as x grows: no less than the mean.
+        assert!((of(x.map(|x| 1.0 + 0.5 * x)).value - 1.5).abs() < 1e-12);
+        assert!((of(x.map(|x| 6.0 - x)).value - 3.0).abs() < 1e-12);
+        // Residuals of ±1 that go with no x: error √(6 / (6 · 4)).
+        let noisy = of([1.0, 1.0, 1.0, -1.0, -1.0, -1.0].map(|e| 5.0 + e));
+        assert!((noisy.error - 0.5).abs() < 1e-12, "{noisy:?}");
     }
 }

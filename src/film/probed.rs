@@ -24,6 +24,8 @@ pub struct StepPixel {
     pub second: Option<[f64; 2]>,
     /// The first set at twice the picture's step, if there is a second one.
     pub twice: Option<f64>,
+    /// The variance of its samples, of which the mean over all pixels of the picture is 1, if the probe's pixels were chosen by it.
+    pub varies: Option<f64>,
 }
 
 /// The noise of a picture by its probe.
@@ -112,11 +114,19 @@ impl ProbedStep {
     /// difference; the mean of D² alone is no less. A method of order p has I(0) − I(h) = D / (1 − m^−p), and the ratio of I(h) − I(2h) to D is
     /// (2^p − 1) / (1 − m^−p). It tells p, from 1 to 2. If rays go to their end at the fine step and at twice the step, D has what is behind the ends
     /// of the others, once. What the fine step still costs is taken to be of first order then: (I(h/m) − I(2h)) / (2m − 1).
+    ///
+    /// Pixels that were chosen since they vary have more of what goes with that than the picture has: a regression takes it from their means.
     pub fn of(pixels: &[StepPixel], shorter: f64, to_the_end: bool) -> Self {
-        let count = pixels.len().max(1) as f64;
+        let mean = |of: &dyn Fn(&StepPixel) -> f64| {
+            if pixels.iter().all(|p| p.varies.is_some()) {
+                Estimate::regressed(pixels.iter().map(|p| [of(p), p.varies.unwrap_or_default()]))
+            } else {
+                Estimate::mean(pixels.iter().map(of))
+            }
+        };
         let apart = |[same, fine]: [f64; 2]| fine - same;
         let other = |p: &StepPixel| apart(p.second.unwrap_or(p.first));
-        let squared = Estimate::mean(pixels.iter().map(|p| apart(p.first) * other(p)));
+        let squared = mean(&|p| apart(p.first) * other(p));
         let whole = [1, 2].map(|order| 1.0 / (1.0 - shorter.powi(-order)));
         let ratios = [whole[0], 3.0 * whole[1]];
         let longer = |p: &StepPixel| p.twice.map(|twice| p.first[0] - twice);
@@ -130,7 +140,7 @@ impl ProbedStep {
             Some(twice) => p.first[0] - twice,
             None => ratios[1] * apart(p.first),
         };
-        let twice = (pixels.iter().map(|p| longer(p).powi(2)).sum::<f64>() / count).sqrt();
+        let twice = mean(&|p| longer(p).powi(2)).value.sqrt();
         let bound = squared.upper().sqrt();
         let bound = if to_the_end {
             bound + twice / (2.0 * shorter - 1.0)
@@ -209,7 +219,7 @@ mod tests {
             let mut other = |own: f64, step| at(step) + own + 0.01 * noise();
             let fine = shorter.recip();
             let (first, second) = ([at(1.0) + a, other(a, fine) + lost], [at(1.0) + b, other(b, fine) + lost]);
-            StepPixel { first, second: Some(second), twice: Some(other(a, 2.0) + lost) }
+            StepPixel { first, second: Some(second), twice: Some(other(a, 2.0) + lost), varies: None }
         };
         (0..4000).map(pixel).collect()
     }
@@ -229,6 +239,21 @@ mod tests {
             steps(0.05, 1, 2.0, 0.0).iter().map(|p| StepPixel { second: None, twice: None, ..*p }).collect();
         let found = ProbedStep::of(&alone, 2.0, false);
         assert!(found.bound > 0.05 && found.bound < 0.07, "{found:?}");
+    }
+
+    #[test]
+    fn pixels_that_were_chosen_since_they_vary_count_as_often_as_the_picture_has_them() {
+        // One pixel of ten has an edge, and the step costs there; among the picture's it is one of a hundred.
+        let mut edges = steps(0.05, 1, 2.0, 0.0);
+        for (i, pixel) in edges.iter_mut().enumerate() {
+            if i % 10 > 0 {
+                *pixel = StepPixel { first: [1.0; 2], second: Some([1.0; 2]), twice: Some(1.0), varies: None };
+            }
+            pixel.varies = Some(if i % 10 > 0 { 0.0 } else { 100.0 });
+        }
+        let found = ProbedStep::of(&edges, 2.0, false);
+        assert!(found.bound > 0.005 && found.bound < 0.007, "{found:?}");
+        assert!((found.twice / 0.005 - 1.0).abs() < 0.1, "{found:?}");
     }
 
     #[test]

@@ -3,6 +3,7 @@
 //! side in a film of its own, so that the rays of a packet lie close together.
 
 mod origin;
+mod pixels;
 mod sets;
 
 use std::rc::Rc;
@@ -11,11 +12,11 @@ use super::context::DeviceContext;
 use super::layer::{Batch, Layer};
 use crate::device::{Buffer, Device};
 use crate::error::Result;
-use crate::film::{CLOSELY, MOST_FOR_STEP, ProbePixel, ProbedNoise, ProbedStep, StepPixel, luminance};
+use crate::film::{CLOSELY, MOST_FOR_STEP, ProbePixel, ProbedNoise, ProbedStep, luminance};
 use crate::render::Scene;
 use origin::Cells;
 pub use sets::Steps;
-use sets::{FINE, KINDS, MOST, QUICK_KINDS, SAME, Set, Step, TWICE};
+use sets::{FINE, KINDS, MOST, QUICK_KINDS, SAME, Set, Step};
 
 /// The pixels of a probe along the picture's shorter side, if that has at least so many pixels, or fewer.
 const ALONG: [usize; 2] = [32, 20];
@@ -49,6 +50,8 @@ pub(super) struct Probe {
     at: usize,
     closely: bool,
     step: Option<ProbedStep>,
+    /// [`StepPixel::varies`] of the pixels that judge the step, if the grid was moved.
+    varies: Vec<f64>,
 }
 
 impl Probe {
@@ -84,6 +87,7 @@ impl Probe {
             at: 0,
             closely: false,
             step: None,
+            varies: Vec::new(),
         };
         probe.set_step(steps.step, &mut table)?;
         Ok(probe)
@@ -126,11 +130,6 @@ impl Probe {
         (self.closely, self.at) = (closely, 0);
     }
 
-    /// The pixels of a set across and down.
-    fn pixels(&self, set: &Set) -> [usize; 2] {
-        self.clusters.map(|n| n.div_ceil(set.sparse) << self.cluster)
-    }
-
     /// The set of a kind.
     fn set(&self, kind: usize) -> Option<&Set> {
         self.sets.iter().find(|set| (set.step, set.stream) == KINDS[kind])
@@ -156,6 +155,23 @@ impl Probe {
         self.sets[self.at].step != Step::Same
     }
 
+    /// Places the grid in the picture.
+    fn place(&mut self, context: &DeviceContext, main: &Layer) -> Result<()> {
+        let Some(first) = self.set(SAME[0]) else { return Ok(()) };
+        let side = self.stride >> self.cluster;
+        let cells = Cells { side, cluster: self.cluster, count: self.clusters, sparse: first.sparse };
+        let origin = cells.origin(context, main)?;
+        self.layer.origin = origin.at;
+        self.varies = match self.set(FINE[0]) {
+            Some(fine) if origin.at != [0; 2] => {
+                let of = |[_, random]: [f64; 2]| if random.is_finite() { random / origin.random } else { 0.0 };
+                self.picture(context, main, fine)?.into_iter().map(of).collect()
+            }
+            _ => Vec::new(),
+        };
+        Ok(())
+    }
+
     /// Prepares the next pass beside a picture.
     pub fn begin(&mut self, context: &DeviceContext, main: &Layer) -> Result<()> {
         let samples = main.samples;
@@ -163,10 +179,8 @@ impl Probe {
             self.begin_stage(samples >= CLOSELY);
         }
         let Some(at) = self.next(samples) else { return Ok(()) };
-        if let (Some(first), true) = (self.set(SAME[0]), self.sets.iter().all(|set| set.samples == 0)) {
-            let (side, sparse) = (self.stride >> self.cluster, first.sparse);
-            let cells = Cells { side, cluster: self.cluster, count: self.clusters, sparse };
-            self.layer.origin = cells.origin(context, main)?;
+        if self.sets.iter().all(|set| set.samples == 0) {
+            self.place(context, main)?;
         }
         let [width, height] = self.pixels(&self.sets[at]);
         let (set, layer) = (&self.sets[at], &mut self.layer);
@@ -224,68 +238,5 @@ impl Probe {
         let per_pixel = (main.width * main.height) as f64 / picture.len() as f64;
         let part = if sets[1].is_some() { f64::from(first.samples) / f64::from(main.samples) } else { f64::INFINITY };
         Ok(Some(ProbedNoise::of(&pixels.collect::<Vec<_>>(), part, per_pixel)))
-    }
-
-    fn step_pixels(&self) -> Vec<StepPixel> {
-        let Some(fine) = self.set(FINE[0]) else { return Vec::new() };
-        let width = self.pixels(fine)[0];
-        let both = |[same, fine]: [usize; 2], i: usize| {
-            let (same, fine) = (self.set(same)?, self.set(fine)?);
-            let factor = fine.sparse / same.sparse;
-            let at = |n: usize| (((n >> self.cluster) * factor) << self.cluster) + n % (1 << self.cluster);
-            Some([same.early[at(i / width) * self.pixels(same)[0] + at(i % width)], fine.mean(i)])
-        };
-        let pixel = |i: usize| {
-            Some(StepPixel {
-                first: both([SAME[0], FINE[0]], i)?,
-                second: both([SAME[1], FINE[1]], i),
-                twice: self.set(TWICE).map(|set| set.mean(i)),
-            })
-        };
-        (0..fine.sums.len()).filter_map(pixel).collect()
-    }
-
-    /// The picture's luminance at the pixels of a set, and the square of the standard error of as many random samples; NaN if a sample was not finite.
-    /// Of one sample it is the variance of the cluster.
-    fn picture(&self, context: &DeviceContext, main: &Layer, set: &Set) -> Result<Vec<[f64; 2]>> {
-        let ([width, height], stride) = (self.pixels(set), self.stride * set.sparse);
-        let [column, line] = self.layer.origin;
-        let rows = |from: usize, channels: usize| -> Result<Vec<f32>> {
-            let (row, mut all) = (4 * channels * main.width, Vec::new());
-            for within in 0..1 << self.cluster {
-                let from = from + (line + within) * row;
-                all.push(context.device.read_rows(
-                    &main.buffer,
-                    from,
-                    stride * row,
-                    height >> self.cluster,
-                    channels * main.width,
-                )?);
-            }
-            Ok(all.concat())
-        };
-        let means = rows(0, 4)?;
-        let squared = if main.samples > 1 { rows(16 * main.width * main.height, 1)? } else { Vec::new() };
-        let n = f64::from(main.samples);
-        let at = |x: usize, y: usize| {
-            let row = y % (1 << self.cluster) * (height >> self.cluster) + (y >> self.cluster);
-            row * main.width + column + (x >> self.cluster) * stride + x % (1 << self.cluster)
-        };
-        let of_cluster = |x: usize, y: usize| {
-            let side = 1 << self.cluster;
-            let all = (0..side * side)
-                .map(|i| luminance(&means[4 * at(x / side * side + i % side, y / side * side + i / side)..]));
-            let mean = all.clone().sum::<f64>() / (side * side) as f64;
-            all.map(|l| (l - mean).powi(2)).sum::<f64>() / (side * side) as f64
-        };
-        let pixel = |i: usize| {
-            let (x, y) = (i % width, i / width);
-            let random = match squared.get(at(x, y)) {
-                Some(m2) => f64::from(*m2) / (n * (n - 1.0)),
-                None => of_cluster(x, y),
-            };
-            [luminance(&means[4 * at(x, y)..]), random]
-        };
-        Ok((0..width * height).map(pixel).collect())
     }
 }

@@ -20,6 +20,15 @@ pub struct Cells {
     pub sparse: usize,
 }
 
+/// The place at which a grid begins.
+pub struct Origin {
+    /// In pixels of the picture.
+    pub at: [usize; 2],
+    /// The mean over the picture's pixels of the square of the standard error that they would have if their samples were random; of one sample, of the
+    /// variance of the cluster.
+    pub random: f64,
+}
+
 /// The variances of a picture's clusters, summed over those above each other at the same place in a cell.
 struct Columns {
     /// Of rows of cells that a sparse probe sees: for each row of a cell, each cluster across.
@@ -28,12 +37,18 @@ struct Columns {
     others: Vec<f64>,
 }
 
+impl Columns {
+    fn sum(&self) -> f64 {
+        self.seen.iter().chain(&self.others).sum()
+    }
+}
+
 impl Cells {
-    /// The cluster of a cell at which the grid begins, in pixels of the picture: the first one, unless that grid sees less than [`ENOUGH`] of the variance
+    /// The cluster of a cell at which the grid begins: the first one, unless that grid sees less than [`ENOUGH`] of the variance
     /// that an average one sees. Then it is the grid that sees the least above the average.
-    pub fn origin(&self, context: &DeviceContext, main: &Layer) -> Result<[usize; 2]> {
+    pub fn origin(&self, context: &DeviceContext, main: &Layer) -> Result<Origin> {
         if self.side < 2 || self.cluster != 1 {
-            return Ok([0; 2]);
+            return Ok(Origin { at: [0; 2], random: 0.0 });
         }
         let across = self.count[0] * self.side;
         let mut columns = Columns { seen: vec![0.0; self.side * across], others: vec![0.0; across] };
@@ -55,7 +70,9 @@ impl Cells {
                 self.add(y, &variances, &mut columns);
             }
         }
-        Ok(self.chosen(&columns).map(|n| n << self.cluster))
+        let n = f64::from(main.samples);
+        let random = columns.sum() / (4 * across * rows) as f64 / if is_light { 1.0 } else { n * (n - 1.0) };
+        Ok(Origin { at: self.chosen(&columns).map(|n| n << self.cluster), random })
     }
 
     /// The variance of each cluster of a row of them, times a constant: that of its pixels' samples, or of one sample that among its pixels.
@@ -88,10 +105,9 @@ impl Cells {
         {
             seen[i / across * self.side + i % across % self.side] += sum;
         }
-        let sum: f64 = columns.seen.iter().chain(&columns.others).sum();
         let cells = |n: usize| n.div_ceil(self.sparse) as f64;
         let all = (self.count[0] * self.count[1] * self.side * self.side) as f64;
-        let average = sum / all * self.count.map(cells).iter().product::<f64>();
+        let average = columns.sum() / all * self.count.map(cells).iter().product::<f64>();
         if seen[0] >= ENOUGH * average {
             return [0; 2];
         }
