@@ -52,6 +52,11 @@ impl Assets {
         Ok(Self { volumes, cache, limits, making: Mutex::new(()) })
     }
 
+    /// The limits, which hold for grids that are computed, too.
+    pub fn limits(&self) -> &AssetLimits {
+        &self.limits
+    }
+
     /// The uploaded volumes.
     pub fn volumes(&self) -> &Store<Volume> {
         &self.volumes

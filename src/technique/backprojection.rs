@@ -63,8 +63,8 @@ pub fn example() -> Value {
     })
 }
 
-fn parse(parameters: &Value, at: &str, _: &Assets) -> Result<Arc<dyn Field>> {
+fn parse(parameters: &Value, at: &str, assets: &Assets) -> Result<Arc<dyn Field>> {
     let Parameters { sinogram, grid, deconvolve } = request::read(parameters, at)?;
     let method = if deconvolve { Method::Deconvolved } else { Method::Plain };
-    Ok(Arc::new(Arc::new(Reconstruction::new(TECHNIQUE.name, &sinogram, &grid, method, at)?)))
+    Ok(Arc::new(Arc::new(Reconstruction::new(TECHNIQUE.name, &sinogram, &grid, method, assets.limits(), at)?)))
 }

@@ -77,7 +77,8 @@ pub fn example() -> Value {
     })
 }
 
-fn parse(parameters: &Value, at: &str, _: &Assets) -> Result<Arc<dyn Field>> {
+fn parse(parameters: &Value, at: &str, assets: &Assets) -> Result<Arc<dyn Field>> {
     let Parameters { sinogram, grid, filter, cutoff } = request::read(parameters, at)?;
-    Ok(Arc::new(Arc::new(Reconstruction::new(TECHNIQUE.name, &sinogram, &grid, Method::Filtered(filter, cutoff), at)?)))
+    let method = Method::Filtered(filter, cutoff);
+    Ok(Arc::new(Arc::new(Reconstruction::new(TECHNIQUE.name, &sinogram, &grid, method, assets.limits(), at)?)))
 }

@@ -13,6 +13,7 @@ use serde_json::{Value, json};
 
 use super::case::{Case, Cases};
 use super::{Field, Look, Process};
+use crate::asset::AssetLimits;
 use crate::device::Device;
 use crate::device::numbers::define;
 use crate::device::program::{Source, Variant};
@@ -118,12 +119,13 @@ impl Reconstruction {
         sinogram: &SinogramRequest,
         grid: &GridRequest,
         method: Method,
+        limits: &AssetLimits,
         at: &str,
     ) -> Result<Self> {
         let (phantom, geometry) = sinogram.resolve(&format!("{at}/sinogram"))?;
-        let (dims, spacing_mm, center_mm) = grid.resolve(&geometry)?;
+        let (dims, spacing_mm, center_mm) = grid.resolve(&geometry);
         let made = Self { technique, phantom, geometry, dims, spacing_mm, center_mm, method };
-        check_voxels(made.computed())?;
+        check_voxels(made.computed(), limits)?;
         if made.planes_seen() == 0 {
             let permitted = "planes within half a bin of the detector's rows";
             return Err(Error::invalid(

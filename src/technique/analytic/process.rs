@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-use super::deconvolve::{cropped, deconvolve};
+use super::deconvolve::{Deblurred, Planes};
 use super::rows::Rows;
 use super::{BackprojectionPass, BackprojectionView, Method, Reconstruction};
 use crate::device::{Buffer, Device, SliceLength, grid};
@@ -30,6 +30,7 @@ pub(super) struct Run {
     block: Block,
     /// The moments of each view.
     moments: Vec<Moments>,
+    deblurred: Deblurred,
     slice_length: SliceLength,
     device_time: Duration,
 }
@@ -56,6 +57,7 @@ impl Run {
             done: 0,
             block: Block::of(&of, 0),
             moments: Vec::new(),
+            deblurred: Deblurred::default(),
             slice_length: SliceLength::new(device.info(), 1.0, None),
             device_time: Duration::ZERO,
             of,
@@ -128,7 +130,20 @@ impl Run {
         Ok(took)
     }
 
-    fn result(&self) -> Value {
+    /// The voxels that are computed.
+    fn computed(&self, device: &Device) -> Result<Vec<f32>> {
+        let mut values = vec![0.0f32; self.of.computed().iter().product()];
+        device.read(&self.grid, 0, &mut values)?;
+        Ok(values)
+    }
+
+    fn planes(&self) -> Planes {
+        let ([wide, high, _], [x, y, _]) = (self.of.computed(), self.of.spacing_mm);
+        Planes { size: [wide, high], spacing_mm: [x, y], margin: self.of.margin() }
+    }
+
+    /// The result of a grid of so many views.
+    fn result(&self, done: usize) -> Value {
         let ([u, v], views) = (self.of.geometry.count(), self.of.geometry.views());
         let angles = &self.of.geometry.angles()[..self.moments.len()];
         let check = DataCheck::of(angles, &self.moments);
@@ -164,7 +179,7 @@ impl Run {
             );
         }
         let device_ms = 1e3 * self.device_time.as_secs_f64();
-        json!({"views": self.done, "bins": [u, v], "unit": "per_mm", "device_ms": device_ms, "data_check": check, "warnings": warnings})
+        json!({"views": done, "bins": [u, v], "unit": "per_mm", "device_ms": device_ms, "data_check": check, "warnings": warnings})
     }
 }
 
@@ -192,13 +207,25 @@ impl Process for Run {
             }
         }
         self.device_time += took;
-        let (done, total) = (self.done as u64, self.of.geometry.views() as u64);
-        Ok(Step {
-            progress: Progress { of: "views", done, total },
+        let total = self.of.geometry.views();
+        let is_more = before.checked_ilog2() != self.done.checked_ilog2();
+        let mut step = Step {
+            progress: Progress { of: "views", done: self.done as u64, total: total as u64 },
             device_time: took,
             is_whole: self.block.next_row == 0,
-            is_look_due: before.checked_ilog2() != self.done.checked_ilog2(),
-        })
+            is_look_due: is_more,
+        };
+        if self.of.method == Method::Deconvolved {
+            let is_all = self.done == total;
+            step.is_look_due = self.deblurred.take(is_all && took.is_zero())?;
+            let newest = self.deblurred.newest().map_or(0, |(views, _)| views);
+            if !self.deblurred.is_under_way() && step.is_whole && newest < self.done && (is_more || is_all) {
+                self.deblurred.begin(self.done, self.computed(device)?, self.planes());
+            }
+            // The last view counts once it is in a deblurred grid.
+            step.progress.done = self.done.min(if newest < total { total - 1 } else { total }) as u64;
+        }
+        Ok(step)
     }
 
     fn stop(&mut self, _: &mut Device) -> Result<()> {
@@ -206,15 +233,16 @@ impl Process for Run {
     }
 
     fn look(&mut self, device: &mut Device) -> Result<Look> {
-        let ([wide, high, deep], margin) = (self.of.computed(), self.of.margin());
-        let computed = wide * high * deep;
         if self.of.method != Method::Deconvolved {
-            return Ok(Look { voxels: grid::copy(device, &self.grid, computed)?, result: self.result() });
+            let voxels = grid::copy(device, &self.grid, self.of.computed().iter().product())?;
+            return Ok(Look { voxels, result: self.result(self.done) });
         }
-        let mut values = vec![0.0f32; computed];
-        device.read(&self.grid, 0, &mut values)?;
-        deconvolve(&mut values, [wide, high], [self.of.spacing_mm[0], self.of.spacing_mm[1]]);
-        let cropped = cropped(&values, [wide, high], margin);
-        Ok(Look { voxels: device.upload(bytemuck::cast_slice(&cropped), grid::PADDING)?, result: self.result() })
+        let upload = |voxels: &[f32]| device.upload(bytemuck::cast_slice(voxels), grid::PADDING);
+        if let Some((views, voxels)) = self.deblurred.newest() {
+            return Ok(Look { voxels: upload(voxels)?, result: self.result(views) });
+        }
+        // It was stopped before there was any.
+        let voxels = self.planes().deblurred(self.computed(device)?);
+        Ok(Look { voxels: upload(&voxels)?, result: self.result(self.done) })
     }
 }

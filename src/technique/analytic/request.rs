@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use crate::asset::AssetLimits;
 use crate::error::{Error, Result};
 use crate::tomography::{Geometry, GeometryRequest, Phantom, PhantomRequest};
 
@@ -71,26 +72,43 @@ impl SinogramRequest {
 
 impl GridRequest {
     /// Voxels, their sides and the centre, mm.
-    ///
-    /// # Errors
-    /// [`Error::TooLarge`] for a grid of too many voxels.
-    pub(in crate::technique) fn resolve(&self, geometry: &Geometry) -> Result<([usize; 3], [f64; 3], [f64; 3])> {
+    pub(in crate::technique) fn resolve(&self, geometry: &Geometry) -> ([usize; 3], [f64; 3], [f64; 3]) {
         let ([u, v], [du, dv]) = (geometry.count(), geometry.spacing_mm());
         let dims = self.dims.unwrap_or([u.min(MOST_SIDE), u.min(MOST_SIDE), v.min(MOST_SIDE)]);
-        check_voxels(dims)?;
-        Ok((dims, self.spacing_mm.unwrap_or([du, du, dv]), self.center_mm.unwrap_or_default()))
+        (dims, self.spacing_mm.unwrap_or([du, du, dv]), self.center_mm.unwrap_or_default())
     }
 }
 
-/// Refuses more voxels than may be computed.
+/// Refuses a grid of more voxels than may be computed, or of more bytes than the server's limits permit.
 ///
 /// # Errors
 /// [`Error::TooLarge`].
-pub(super) fn check_voxels(dims: [usize; 3]) -> Result<()> {
+pub(super) fn check_voxels(dims: [usize; 3], limits: &AssetLimits) -> Result<()> {
     let voxels = dims.iter().fold(1usize, |all, n| all.saturating_mul(*n));
-    if voxels > MOST_VOXELS {
+    let most = limits.volume.max_volume_bytes / size_of::<f32>() as u64;
+    let most = most.min(MOST_VOXELS as u64);
+    if voxels as u64 > most {
         let what = format!("a grid of {voxels} voxels");
-        return Err(Error::TooLarge { what, limit: format!("{MOST_VOXELS} voxels") });
+        return Err(Error::TooLarge { what, limit: format!("{most} voxels of 4 bytes") });
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::volume::VolumeLimits;
+
+    #[test]
+    fn a_grid_has_no_more_bytes_than_a_volume_may_have() {
+        let limits = |max_volume_bytes| AssetLimits {
+            volume: VolumeLimits { max_volume_bytes, ..VolumeLimits::default() },
+            max_store_bytes: 0,
+            max_resident_bytes: 0,
+        };
+        assert!(check_voxels([10, 10, 10], &limits(4000)).is_ok());
+        let refused = check_voxels([10, 10, 10], &limits(3999));
+        assert!(matches!(&refused, Err(Error::TooLarge { limit, .. }) if limit.contains("999 voxels")), "{refused:?}");
+        assert!(check_voxels([usize::MAX, 2, 1], &limits(u64::MAX)).is_err());
+    }
 }

@@ -207,16 +207,23 @@ async fn a_large_simulation_does_not_hold_up_a_small_render() {
         "technique": "emission_absorption", "image": {"width": 64, "height": 64},
         "volume": {"photon_transport": {"photons": 1_000_000_000, "grid": [256, 256, 256]}},
     });
+    let longest = async |seeds: std::ops::Range<u32>| {
+        let mut longest: f64 = 0.0;
+        for seed in seeds {
+            let resource = api.finish(&with(small(), "/seed", json!(seed))).await;
+            longest = longest.max(resource["timings"]["elapsed_ms"].as_f64().unwrap());
+        }
+        longest
+    };
+    // Its kernels may have to be compiled first, and the machine may have other work.
+    longest(100..101).await;
+    let before = longest(0..4).await;
     let path = api.start(&body).await;
-    let mut longest: f64 = 0.0;
-    for seed in 0..8 {
-        let resource = api.finish(&with(small(), "/seed", json!(seed))).await;
-        longest = longest.max(resource["timings"]["elapsed_ms"].as_f64().unwrap());
-    }
+    let beside = longest(4..12).await;
     assert_eq!(api.get_json(&path).await["state"], "running");
     api.delete(&path).await;
-    // Alone, it takes some 20 ms. Two seconds are not a measure of speed, but a sign that something held the device.
-    assert!(longest < 2000.0, "a render of 64 by 48 pixels took {longest} ms");
+    // Some turns of the other are between its own. A hundred times as long is a sign that something held the device.
+    assert!(beside < 100.0 * before.max(20.0), "a render of 64 by 48 pixels took {beside} ms, and {before} ms before");
 }
 
 #[tokio::test]
