@@ -89,6 +89,7 @@ mod tests {
         let wide = Estimate { value: 1.0, error: 5.0 };
         assert!((wide.at_most(3.0).upper() - 3.0).abs() < 1e-12 && (wide.at_most(0.5).upper() - 1.0).abs() < 1e-12);
     }
+
     #[test]
     fn a_regression_takes_from_the_mean_what_the_choice_of_the_pixels_added() {
         // Pixels that vary three times as much as the picture's do.

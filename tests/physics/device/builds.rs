@@ -1,11 +1,68 @@
-//! Each variant is a program of its own, and a warning fails its build.
+//! Every variant builds, with warnings as errors, and each is a program of its own.
 
 use std::process::Command;
 
 use cloudchamber::device::program::{Source, Variant};
+use cloudchamber::run;
 use cloudchamber::technique;
 
 use super::open;
+use crate::common::processes::in_processes;
+use crate::levels::is_full;
+
+/// All numbers of lanes.
+const LANES: [u32; 4] = [1, 4, 8, 16];
+
+/// The variants that are built for a number of lanes: each combination of features with one type of voxels, and another type for each number of
+/// lanes, so that every variant is built once. `--full` builds all for all.
+fn built(variants: &[Variant], lanes: u32) -> Vec<Variant> {
+    if is_full() {
+        return variants.to_vec();
+    }
+    let mut combinations: Vec<(&Variant, Vec<&Variant>)> = Vec::new();
+    for variant in variants {
+        let same = |other: &Variant| (other.features, other.function) == (variant.features, variant.function);
+        match combinations.iter_mut().find(|(first, _)| same(first)) {
+            Some((_, of_types)) => of_types.push(variant),
+            None => combinations.push((variant, vec![variant])),
+        }
+    }
+    let turn = LANES.iter().position(|n| *n == lanes).unwrap();
+    combinations.iter().enumerate().map(|(at, (_, of_types))| *of_types[(at + turn) % of_types.len()]).collect()
+}
+
+#[test]
+fn every_variant_builds_with_warnings_as_errors() {
+    in_processes("device::builds::every_variant_builds_with_warnings_as_errors", &["1 16", "4 8"], |some| {
+        for lanes in some.split(' ').map(|n| n.parse().unwrap()) {
+            let mut device = open(Some(lanes), None);
+            for source in run::sources() {
+                for variant in built(&(source.variants)(), lanes) {
+                    assert!(variant.options(lanes, false, true).contains("-Werror"));
+                    let built = device.build(&source, &variant);
+                    built.unwrap_or_else(|e| panic!("{} with {lanes} lanes: {e}", variant.label()));
+                }
+            }
+        }
+    });
+}
+
+#[test]
+fn each_combination_of_features_and_each_type_of_voxels_is_built() {
+    for t in technique::ALL {
+        let variants = ((t.source)().variants)();
+        for lanes in LANES {
+            let chosen = built(&variants, lanes);
+            for variant in &variants {
+                assert!(chosen.iter().any(|c| c.features == variant.features), "{}", variant.label());
+            }
+        }
+        let all: Vec<Variant> = LANES.iter().flat_map(|lanes| built(&variants, *lanes)).collect();
+        for variant in &variants {
+            assert!(all.contains(variant), "{} is built for no number of lanes", variant.label());
+        }
+    }
+}
 
 /// The program of a variant as its compiler sees it, after the preprocessor.
 pub fn preprocessed(source: &Source, variant: &Variant) -> String {

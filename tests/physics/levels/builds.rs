@@ -1,4 +1,4 @@
-//! Every variant compiles without a warning, and every kernel for every level.
+//! Every kernel compiles for every level without a warning.
 
 use std::path::Path;
 use std::sync::OnceLock;
@@ -7,11 +7,10 @@ use std::time::Instant;
 use cloudchamber::device;
 use cloudchamber::device::program::{Source, Variant};
 use cloudchamber::run;
-use cloudchamber::technique;
 use cloudchamber::volume::VoxelType;
 use rayon::prelude::*;
 
-use super::compiler::{Compiler, How, LEVELS, Level};
+use super::compiler::{Compiler, LEVELS, Level};
 use crate::common::{kernels, opening, say};
 
 fn compiler() -> &'static Compiler {
@@ -33,22 +32,24 @@ fn one_of(variants: &[Variant], kernel: usize, level: usize) -> Variant {
     *of_type[level * of_type.len() / LEVELS.len()]
 }
 
-fn compile(compiler: &Compiler, level: &Level, source: &Source, variant: &Variant, how: How) -> Result<bool, String> {
+fn compile(compiler: &Compiler, level: &Level, source: &Source, variant: &Variant) -> Result<bool, String> {
     let text = source.text(kernels().as_deref()).unwrap();
-    let options = variant.options(level.lanes, false, true);
-    assert!(options.contains("-Werror"));
-    let built = compiler.compile_once(level, &options, &text, how);
+    let built = compiler.compile_once(level, &variant.options(level.lanes, false, true), &text);
     built.map_err(|said| format!("{} ({}, {} lanes): {}:\n{said}", level.name, level.cpu, level.lanes, variant.label()))
 }
 
 /// Compiles the jobs on all cores, and fails with the compiler's messages about those that do not build.
-fn all_build(jobs: &[(&Level, &Source, Variant)], how: How) {
+fn all_build(jobs: &[(&Level, &Source, Variant)]) {
     let (compiler, started) = (compiler(), Instant::now());
     let done: Vec<_> =
-        jobs.par_iter().map(|(level, source, variant)| compile(compiler, level, source, variant, how)).collect();
+        jobs.par_iter().map(|(level, source, variant)| compile(compiler, level, source, variant)).collect();
     let anew = done.iter().filter(|d| matches!(d, Ok(true))).count();
     let seconds = started.elapsed().as_secs_f64();
-    say(&format!("{} variants, {anew} of them compiled anew, in {seconds:.1} s", jobs.len()));
+    say(&format!(
+        "{} kernels for {} levels, {anew} of them compiled anew, in {seconds:.1} s",
+        jobs.len(),
+        LEVELS.len()
+    ));
     let faults: Vec<_> = done.into_iter().filter_map(Result::err).collect();
     assert!(faults.is_empty(), "{} of {} do not build:\n{}", faults.len(), jobs.len(), faults.join("\n"));
 }
@@ -61,51 +62,7 @@ fn every_kernel_builds_at_every_level() {
         let variants = (source.variants)();
         jobs.extend(LEVELS.iter().enumerate().map(|(l, level)| (level, source, one_of(&variants, n, l))));
     }
-    all_build(&jobs, How::Code);
-}
-
-/// The levels and the numbers of lanes that all variants are compiled for.
-fn turns() -> Vec<Level> {
-    let of = |name: &str| LEVELS.iter().find(|l| l.name == name).unwrap();
-    vec![Level { lanes: 1, ..*of("AVX2") }, *of("SSE4"), *of("AVX2"), *of("AVX-512")]
-}
-
-/// The variants that are compiled for a turn: each combination of features with one type of voxels, and another type in each turn, so that every
-/// variant is compiled once.
-fn in_turn(variants: &[Variant], turn: usize) -> Vec<Variant> {
-    let mut combinations: Vec<(&Variant, Vec<&Variant>)> = Vec::new();
-    for variant in variants {
-        let same = |other: &Variant| (other.features, other.function) == (variant.features, variant.function);
-        match combinations.iter_mut().find(|(first, _)| same(first)) {
-            Some((_, of_types)) => of_types.push(variant),
-            None => combinations.push((variant, vec![variant])),
-        }
-    }
-    combinations.iter().enumerate().map(|(at, (_, of_types))| *of_types[(at + turn) % of_types.len()]).collect()
-}
-
-#[test]
-fn every_variant_builds_without_a_warning() {
-    let (sources, turns) = (sources(), turns());
-    let mut jobs = Vec::new();
-    for (turn, level) in turns.iter().enumerate() {
-        for source in &sources {
-            jobs.extend(in_turn(&(source.variants)(), turn).into_iter().map(|variant| (level, source, variant)));
-        }
-    }
-    all_build(&jobs, How::Front);
-}
-
-#[test]
-fn each_combination_of_features_and_each_type_of_voxels_has_its_turn() {
-    for t in technique::ALL {
-        let variants = ((t.source)().variants)();
-        let turns: Vec<Vec<Variant>> = (0..turns().len()).map(|turn| in_turn(&variants, turn)).collect();
-        for variant in &variants {
-            let everywhere = turns.iter().all(|chosen| chosen.iter().any(|c| c.features == variant.features));
-            assert!(everywhere && turns.iter().flatten().any(|c| c == variant), "{}", variant.label());
-        }
-    }
+    all_build(&jobs);
 }
 
 #[test]
@@ -120,7 +77,7 @@ fn every_variant_builds_at_every_level() {
             jobs.extend((source.variants)().into_iter().map(|variant| (level, source, variant)));
         }
     }
-    all_build(&jobs, How::Code);
+    all_build(&jobs);
 }
 
 /// Compiles a program of one header, with the structs and a variant of a kernel that includes it.
@@ -134,7 +91,7 @@ fn build_alone(header: &str) -> Result<bool, String> {
     std::fs::write(folder.path().join(format!("{}.cl", source.kernel)), program).unwrap();
     let text = source.text(Some(folder.path())).unwrap();
     let options = (source.variants)()[0].options(LEVELS[0].lanes, false, true);
-    compiler().compile_once(&LEVELS[0], &options, &text, How::Front).map_err(|said| format!("{header} alone:\n{said}"))
+    compiler().compile_once(&LEVELS[0], &options, &text).map_err(|said| format!("{header} alone:\n{said}"))
 }
 
 #[test]
@@ -160,7 +117,7 @@ fn a_vector_wider_than_the_registers_fails_where_it_is_wider() {
     let compiler = compiler();
     let build = |level: &str, lanes: u32| {
         let level = LEVELS.iter().find(|l| l.name == level).unwrap();
-        compiler.compile(level, "-cl-std=CL1.2 -Werror", &wide(lanes), How::Code)
+        compiler.compile(level, "-cl-std=CL1.2 -Werror", &wide(lanes))
     };
     for (level, fits, too_wide) in
         [("AVX-512", 8, None), ("AVX2", 4, Some(8)), ("AVX", 4, Some(8)), ("SSE4", 2, Some(4))]
@@ -184,8 +141,7 @@ fn a_warning_fails_the_build_and_names_the_level() {
     };
     let variant = Variant::new("cells", Some(VoxelType::U8), &[]);
     for level in &LEVELS {
-        let said =
-            compile(compiler(), level, &source, &variant, How::Front).expect_err("an assignment for a comparison");
+        let said = compile(compiler(), level, &source, &variant).expect_err("an assignment for a comparison");
         assert!(said.starts_with(level.name) && said.contains("-Werror"), "{said}");
     }
 }

@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// The common properties of the processors of a level.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 pub struct Level {
     pub name: &'static str,
     /// The number of lanes, which fill a vector.
     pub lanes: u32,
-    pub triple: &'static str,
+    triple: &'static str,
     /// The processor that PoCL compiles for at this level.
     pub cpu: &'static str,
 }
@@ -47,15 +47,6 @@ const EXTENSIONS: [&str; 11] = [
     "cl_khr_fp64",
 ];
 
-/// How far a program is compiled.
-#[derive(Debug, Clone, Copy)]
-pub enum How {
-    /// By the front end, which has the messages about the program, but for few.
-    Front,
-    /// To the level's assembly. Clang gives some messages only while it makes code, and the level's instructions are chosen last of all.
-    Code,
-}
-
 /// A clang and a folder of the programs that it is known to compile.
 pub struct Compiler {
     program: String,
@@ -76,11 +67,12 @@ impl Compiler {
         Self { program, version, kept }
     }
 
-    /// Compiles a program. It does not optimise, which would take twice as long.
+    /// Compiles to the level's assembly. Clang gives some messages only while it makes code, such as that a vector is too wide to be passed
+    /// (`-Wpsabi`), and the level's instructions are chosen last of all. It does not optimise, which would take twice as long.
     ///
     /// # Errors
     /// The compiler's message.
-    pub fn compile(&self, level: &Level, options: &str, text: &str, how: How) -> Result<(), String> {
+    pub fn compile(&self, level: &Level, options: &str, text: &str) -> Result<(), String> {
         let extensions: String = EXTENSIONS.iter().map(|e| format!(",+{e}")).collect();
         let mut front: Vec<String> = OPTIONS.split_whitespace().map(str::to_owned).collect();
         front.extend(EXTENSIONS.map(|e| format!("-D{e}=1")));
@@ -88,9 +80,6 @@ impl Compiler {
         front.extend(["-I", HEADERS, "-include", "_kernel.h"].map(str::to_owned));
         front.extend(options.split_whitespace().map(str::to_owned));
         let code = self.run(level, front.into_iter().chain(["-emit-llvm".into()]), text.as_bytes())?;
-        if matches!(how, How::Front) {
-            return Ok(());
-        }
         // Only some back ends know how to call a kernel. PoCL also makes it a plain function before it gets there.
         let plain = code.replace("spir_kernel ", "");
         self.run(level, ["-cc1", "-x", "ir", "-S"].map(str::to_owned).into_iter(), plain.as_bytes()).map(drop)
@@ -117,13 +106,13 @@ impl Compiler {
     ///
     /// # Errors
     /// As [`Compiler::compile`].
-    pub fn compile_once(&self, level: &Level, options: &str, text: &str, how: How) -> Result<bool, String> {
-        let all = format!("{}\n{OPTIONS}\n{EXTENSIONS:?}\n{level:?}\n{how:?}\n{options}\n{text}", self.version);
+    pub fn compile_once(&self, level: &Level, options: &str, text: &str) -> Result<bool, String> {
+        let all = format!("{}\n{OPTIONS}\n{EXTENSIONS:?}\n{level:?}\n{options}\n{text}", self.version);
         let mark = self.kept.join(blake3::hash(all.as_bytes()).to_hex().as_str());
         if mark.exists() {
             return Ok(false);
         }
-        self.compile(level, options, text, how)?;
+        self.compile(level, options, text)?;
         std::fs::write(mark, "").unwrap();
         Ok(true)
     }
