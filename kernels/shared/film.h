@@ -6,8 +6,7 @@
 #define SHARED_FILM_H
 
 #include "shared/lanes.h"
-
-static inline float luminance(float4 c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
+#include "shared/luminance.h"
 
 static inline void film_add(global float *film, global uint *counts, int pixel, int pixels, int sample, float4 colour) {
     float4 mean = sample ? vload4(pixel, film) : (float4)(0.0f);

@@ -3,6 +3,7 @@
 #define SHARED_PIXELS_H
 
 #include "shared/lanes.h"
+#include "shared/luminance.h"
 
 // Linear, premultiplied colour and alpha of the pixels from `pixel` on: interleaved in memory, four numbers each.
 #if LANES == 1
@@ -27,8 +28,6 @@ static inline Real3 load_pixels(global const float *film, int pixel, Real *alpha
     return real3(EACH(0, 4, 8, c), EACH(1, 5, 9, d), EACH(2, 6, a, e));
 }
 #endif
-
-static inline Real luminances(Real3 c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
 
 // One number per pixel.
 static inline Real load_reals(global const float *from, int pixel) {

@@ -20,6 +20,7 @@ mod select;
 mod signature;
 mod slice_length;
 pub mod structs;
+pub mod variance;
 
 use std::collections::HashMap;
 use std::path::PathBuf;

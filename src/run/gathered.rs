@@ -10,6 +10,7 @@ use super::motion::Moving;
 use super::probe::{Probe, Steps};
 use super::rounds::Rounds;
 use crate::device::encode::{EncodeSettings, Encoder, Set};
+use crate::device::variance;
 use crate::device::{Buffer, Device};
 use crate::error::Result;
 use crate::film::picture::Background;
@@ -82,6 +83,7 @@ impl Gathered {
         let ([of_preview, of_main], of_probe) =
             room.map_or(([None, None], None), |(layers, probe)| (layers.map(Some), probe.map(|p| p.layer.buffer)));
         let encoder = Encoder::new(&mut context.device, &context.curve, size, scene.background(), encoder)?;
+        variance::build(&mut context.device)?;
         let device = &context.device;
         let sparse = match size[0].min(size[1]) {
             400.. => PREVIEW[0],

@@ -1,7 +1,7 @@
 //! All kernels of this program, and the variants that are compiled before somebody asks for them.
 
 use crate::device::program::{Source, Variant};
-use crate::device::{cells, encode, grid, reduce};
+use crate::device::{cells, encode, grid, reduce, variance};
 use crate::error::{Error, Result};
 use crate::technique;
 use crate::volume::VoxelType;
@@ -12,6 +12,7 @@ pub fn sources() -> impl Iterator<Item = Source> {
         encode::source(),
         grid::source(),
         reduce::source(),
+        variance::source(),
     ])
 }
 
@@ -22,12 +23,13 @@ pub(super) fn source_of(variant: &Variant) -> Result<Source> {
 }
 
 /// The variants that the first picture most likely needs: the first technique on words, as which the floats of built-in volumes are taken, and on
-/// bytes, and the encoder of films.
+/// bytes, the encoder of films, and the kernel that tells where they vary.
 pub(super) fn first() -> Vec<Variant> {
     let views = technique::ALL.first().map_or(Vec::new(), |t| ((t.source)().variants)());
     let of =
         |voxel| views.iter().find(move |v| v.voxel == Some(voxel)).copied().into_iter().chain(cells::needed(voxel));
-    of(VoxelType::U16).chain(of(VoxelType::U8)).chain((encode::source().variants)()).collect()
+    let of_films = [encode::source(), variance::source()].into_iter().flat_map(|source| (source.variants)());
+    of(VoxelType::U16).chain(of(VoxelType::U8)).chain(of_films).collect()
 }
 
 /// The variants that are compiled ahead, the likeliest first.

@@ -11,6 +11,7 @@ mod names;
 mod oclgrind;
 mod reductions;
 mod structs;
+mod variances;
 
 use std::path::Path;
 

@@ -1,14 +1,12 @@
 //! Where the grid of a probe begins in the picture. A grid that passes over what varies would say nothing of it.
 
+use crate::device::variance::{self, VariancePass};
 use crate::error::Result;
-use crate::film::luminance;
 use crate::run::context::DeviceContext;
 use crate::run::layer::Layer;
 
 /// A grid that sees less than this part of the variance of an average one is moved.
 const ENOUGH: f64 = 0.75;
-/// Rows of clusters that are read at once.
-const BAND: usize = 128;
 
 /// The clusters of a picture, in cells: a probe has one of each `sparse`-th cell, at the same place in all of them.
 pub struct Cells {
@@ -29,20 +27,6 @@ pub struct Origin {
     pub random: f64,
 }
 
-/// The variances of a picture's clusters, summed over those above each other at the same place in a cell.
-struct Columns {
-    /// Of rows of cells that a sparse probe sees: for each row of a cell, each cluster across.
-    seen: Vec<f64>,
-    /// Of the other rows of cells.
-    others: Vec<f64>,
-}
-
-impl Columns {
-    fn sum(&self) -> f64 {
-        self.seen.iter().chain(&self.others).sum()
-    }
-}
-
 impl Cells {
     /// The cluster of a cell at which the grid begins: the first one, unless that grid sees less than [`ENOUGH`] of the variance
     /// that an average one sees. Then it is the grid that sees the least above the average.
@@ -50,64 +34,38 @@ impl Cells {
         if self.side < 2 || self.cluster != 1 {
             return Ok(Origin { at: [0; 2], random: 0.0 });
         }
-        let across = self.count[0] * self.side;
-        let mut columns = Columns { seen: vec![0.0; self.side * across], others: vec![0.0; across] };
-        // Of one sample the colours are read, else the squared deviations behind them.
-        let is_light = main.samples < 2;
-        let (first, channels) = if is_light { (0, 4) } else { (16 * main.width * main.height, 1) };
-        let row = 2 * main.width;
-        let mut variances = vec![0.0; across];
-        let (mut read, mut light) = (vec![0.0f32; channels * row * BAND], vec![0.0; row]);
-        let rows = self.count[1] * self.side;
-        for from in (0..rows).step_by(BAND) {
-            let band = &mut read[..channels * row * BAND.min(rows - from)];
-            context.device.read(&main.buffer, first + 4 * channels * row * from, band)?;
-            for (y, pixels) in (from..).zip(band.chunks(channels * row)) {
-                for (light, rgba) in light.iter_mut().zip(pixels.chunks_exact(4)).filter(|_| is_light) {
-                    *light = luminance(rgba) as f32;
-                }
-                self.variances(if is_light { &light } else { pixels }, is_light, &mut variances);
-                self.add(y, &variances, &mut columns);
-            }
-        }
+        // Of one sample the colours are looked at, else the squared deviations of the samples.
+        let of_colours = main.samples < 2;
+        let int = |n: usize| n as i32;
+        let pass = VariancePass {
+            width: int(main.width),
+            height: int(main.height),
+            side: int(self.side),
+            cells: self.count.map(int),
+            sparse: int(self.sparse),
+            of_colours: i32::from(of_colours),
+        };
+        let sums = variance::of_clusters(&context.device, &main.buffer, &pass)?;
+        let clusters = self.count.iter().product::<usize>() * self.side * self.side;
         let n = f64::from(main.samples);
-        let random = columns.sum() / (4 * across * rows) as f64 / if is_light { 1.0 } else { n * (n - 1.0) };
-        Ok(Origin { at: self.chosen(&columns).map(|n| n << self.cluster), random })
-    }
-
-    /// The variance of each cluster of a row of them, times a constant: that of its pixels' samples, or of one sample that among its pixels.
-    fn variances(&self, row: &[f32], is_light: bool, out: &mut [f32]) {
-        let (upper, lower) = row.split_at(row.len() / 2);
-        for ((out, a), b) in out.iter_mut().zip(upper.chunks_exact(2)).zip(lower.chunks_exact(2)) {
-            // Deviations from a pixel: no digits are lost in an even picture.
-            let [x, y, z] = [a[1] - a[0], b[0] - a[0], b[1] - a[0]];
-            let mean = 0.25 * (x + y + z);
-            *out = if is_light { x * x + y * y + z * z - 4.0 * mean * mean } else { a[0] + a[1] + b[0] + b[1] };
-        }
-    }
-
-    /// Adds a row of clusters.
-    fn add(&self, y: usize, variances: &[f32], columns: &mut Columns) {
-        let is_seen = (y / self.side).is_multiple_of(self.sparse);
-        let from = if is_seen { y % self.side * variances.len() } else { 0 };
-        let sums = if is_seen { &mut columns.seen[from..] } else { &mut columns.others[..] };
-        for (sum, variance) in sums.iter_mut().zip(variances) {
-            *sum += f64::from(if variance.is_finite() { *variance } else { 0.0 });
-        }
+        let per_sample = if of_colours { 1.0 } else { n * (n - 1.0) };
+        let random = sum(&sums) / (4 * clusters) as f64 / per_sample;
+        Ok(Origin { at: self.chosen(&sums).map(|n| n << self.cluster), random })
     }
 
     /// The place in a cell of the grid to take, in clusters.
-    fn chosen(&self, columns: &Columns) -> [usize; 2] {
+    ///
+    /// `sums` are those of [`variance::of_clusters`]: a sparse grid sees only the cells in their first half.
+    fn chosen(&self, sums: &[f32]) -> [usize; 2] {
         let across = self.count[0] * self.side;
         let mut seen = vec![0.0; self.side * self.side];
-        for (i, sum) in
-            columns.seen.iter().enumerate().filter(|(i, _)| (i % across / self.side).is_multiple_of(self.sparse))
-        {
-            seen[i / across * self.side + i % across % self.side] += sum;
+        let of_seen = sums[..sums.len() / 2].iter().enumerate();
+        for (i, sum) in of_seen.filter(|(i, _)| (i % across / self.side).is_multiple_of(self.sparse)) {
+            seen[i / across * self.side + i % across % self.side] += f64::from(*sum);
         }
         let cells = |n: usize| n.div_ceil(self.sparse) as f64;
         let all = (self.count[0] * self.count[1] * self.side * self.side) as f64;
-        let average = columns.sum() / all * self.count.map(cells).iter().product::<f64>();
+        let average = sum(sums) / all * self.count.map(cells).iter().product::<f64>();
         if seen[0] >= ENOUGH * average {
             return [0; 2];
         }
@@ -117,19 +75,21 @@ impl Cells {
     }
 }
 
+fn sum(of: &[f32]) -> f64 {
+    of.iter().map(|v| f64::from(*v)).sum()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     /// The place that is chosen for a picture of 3 × 2 cells of 4 × 4 clusters.
     fn chosen(sparse: usize, variance: impl Fn(usize, usize) -> f32) -> [usize; 2] {
-        let cells = Cells { side: 4, cluster: 1, count: [3, 2], sparse };
-        let mut columns = Columns { seen: vec![0.0; 4 * 12], others: vec![0.0; 12] };
-        for row in 0..8 {
-            let variances: Vec<f32> = (0..12).map(|x| variance(x, row)).collect();
-            cells.add(row, &variances, &mut columns);
+        let mut sums = vec![0.0; 2 * 4 * 12];
+        for (x, y) in (0..8).flat_map(|y| (0..12).map(move |x| (x, y))) {
+            sums[(4 * usize::from(y / 4 % sparse != 0) + y % 4) * 12 + x] += variance(x, y);
         }
-        cells.chosen(&columns)
+        Cells { side: 4, cluster: 1, count: [3, 2], sparse }.chosen(&sums)
     }
 
     #[test]
@@ -142,8 +102,6 @@ mod tests {
         assert_eq!(chosen(1, |x, y| if (x, y) == (6, 5) { 1.0 } else { 0.0 }), [2, 1]);
         // Of two that see more than the average, the one that sees less.
         assert_eq!(chosen(1, |x, y| [0.0, 3.0, 2.0, 0.0][x % 4] * f32::from(u8::from(y % 4 == 3))), [2, 3]);
-        // A value that is not finite is left out.
-        assert_eq!(chosen(1, |x, y| if (x, y) == (6, 5) { f32::NAN } else { 0.5 }), [0, 0]);
     }
 
     #[test]

@@ -75,7 +75,7 @@ fn tiny() -> Vec<Value> {
             "medium": {"phase": {"type": "klein_nishina"}, "attenuation": {"material": "water"}}}),
     ];
     let request = |own| {
-        json!({"technique": "emission_absorption", "volume": {TECHNIQUE.name: own}, "image": {"width": 5, "height": 4},
+        json!({"technique": "slice", "volume": {TECHNIQUE.name: own}, "image": {"width": 5, "height": 4},
             "budget": {"samples": 1}})
     };
     own.map(request).to_vec()
