@@ -1,5 +1,6 @@
 //! The encoding of a picture with its description as PNG or OpenEXR bytes.
 
+mod grey;
 mod stripes;
 
 use std::borrow::Cow;
@@ -9,6 +10,7 @@ use exr::prelude::{
 };
 
 use crate::error::{Error, Result};
+pub use grey::grey_png;
 use stripes::Deflated;
 
 /// Encodes 8-bit sRGB, three or four bytes a pixel, as PNG, by a fast encoder, since a frame is looked at once. `description` goes into its

@@ -27,8 +27,8 @@
 //! | [`device`] | the only home of OpenCL and of `unsafe`: context, programs, buffers, bounded launches |
 //! | [`film`] | sums on the host: picture and error |
 //! | [`frame`] | picture to PNG or EXR, with its metadata |
-//! | [`asset`] | stored things, by the hash of their content: volumes |
-//! | [`tomography`] | geometry of measurements, phantoms with exact line integrals, filters, a check of data |
+//! | [`asset`] | stored things, by the hash of their content: volumes, sinograms |
+//! | [`tomography`] | geometry of measurements, sinograms and their readers, phantoms with exact line integrals, filters, a check of data |
 //! | [`volume`] | grids: readers, built-ins |
 //! | [`power_law`] | lines on logarithmic axes |
 //! | [`split_mix`] | random numbers of the host |

@@ -33,7 +33,7 @@ impl Side {
         Self { server, client, volumes: Names::new(), renders: Vec::new() }
     }
 
-    /// Uploads all test volumes.
+    /// Uploads all test volumes, and the test sinogram, of which older builds know nothing.
     pub async fn upload_volumes(&mut self) -> Vec<Reply> {
         let mut replies = Vec::new();
         for name in pictures::VOLUMES {
@@ -47,6 +47,16 @@ impl Side {
             self.volumes.insert(name.into(), id.unwrap_or_else(|| panic!("{name} was not taken: {reply:?}")));
             replies.push(self.masked(reply));
         }
+        let said = json!({"method": "POST", "path": "/v1/sinograms"});
+        let call = Call {
+            label: pictures::SINOGRAM.into(),
+            body: Some(pictures::sinogram()),
+            ..Call::new(&said, &self.volumes)
+        };
+        let reply = self.send(&call).await;
+        let id = reply.json().and_then(|info| info["id"].as_str().map(str::to_owned));
+        self.volumes.insert(pictures::SINOGRAM.into(), id.unwrap_or_default());
+        replies.push(self.masked(reply));
         replies
     }
 

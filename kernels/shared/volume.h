@@ -6,6 +6,7 @@
 #include "shared/image.h"
 #include "shared/lanes.h"
 #include "shared/voxel.h"
+#include "shared/voxel_lanes.h"
 
 // INTERPOLATION selects the interpolation between voxels.
 #ifndef INTERPOLATION
@@ -14,29 +15,12 @@
 
 // A volume is a buffer or a 3D image. The functions that read it have a body for each.
 
-// The voxel at the start of a word.
-static inline Real first_voxel(Int word) {
-#if VOXEL == VOXEL_U8
-    return to_real(word & 0xff);
-#elif VOXEL == VOXEL_I16
-    return to_real((word << 16) >> 16);
-#elif VOXEL == VOXEL_U16
-    return to_real(word & 0xffff);
-#else
-    return as_Real(word);
-#endif
-}
-
 // One voxel per lane; the index is clamped to the grid.
 static inline Real voxel_raw(constant const View *view, VOLUME voxels, Int x, Int y, Int z) {
     x = clamp(x, (Int)(0), (Int)(view->dims[0] - 1));
     y = clamp(y, (Int)(0), (Int)(view->dims[1] - 1));
     z = clamp(z, (Int)(0), (Int)(view->dims[2] - 1));
-#if VOLUMES_ARE_IMAGES
-    return read_imagef(voxels, point_sampler, (int4)(x, y, z, 0)).x * CHANNEL_SCALE;
-#else
-    return first_voxel(gather_words(voxels, ((z * view->dims[1] + y) * view->dims[0] + x) * VOXEL_BYTES));
-#endif
+    return voxel_at(view->dims, voxels, x, y, z);
 }
 
 // The value of the voxel that contains p.

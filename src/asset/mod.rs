@@ -6,6 +6,8 @@
 mod cache;
 mod folder;
 mod kind;
+mod sinogram;
+mod space;
 mod store;
 mod volume;
 
@@ -15,9 +17,11 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 pub use cache::Resident;
 use cache::{Cache, SharedCache};
 pub use kind::Asset;
+use space::{SharedSpace, Space};
 pub use store::Store;
 
 use crate::error::{Error, Result};
+use crate::tomography::Sinogram;
 use crate::volume::builtin::{self, BUILTINS};
 use crate::volume::{Volume, VolumeInfo, VolumeLimits};
 
@@ -35,7 +39,9 @@ pub struct AssetLimits {
 /// All stored things. One process at a time may use a folder.
 pub struct Assets {
     volumes: Store<Volume>,
+    sinograms: Store<Sinogram>,
     cache: SharedCache,
+    space: SharedSpace,
     limits: AssetLimits,
     /// The lock for the making of built-ins, one at a time. It is taken before the cache's, never after.
     making: Mutex<()>,
@@ -48,8 +54,10 @@ impl Assets {
     /// [`Error::Internal`] if the folder cannot be used.
     pub fn open(dir: &Path, limits: AssetLimits) -> Result<Self> {
         let cache = SharedCache::new(Mutex::new(Cache::new(limits.max_resident_bytes)));
-        let volumes = Store::open(&dir.join("volumes"), limits, cache.clone())?;
-        Ok(Self { volumes, cache, limits, making: Mutex::new(()) })
+        let space = SharedSpace::new(Space::new(limits.max_store_bytes));
+        let volumes = Store::open(&dir.join("volumes"), limits, cache.clone(), space.clone())?;
+        let sinograms = Store::open(&dir.join("sinograms"), limits, cache.clone(), space.clone())?;
+        Ok(Self { volumes, sinograms, cache, space, limits, making: Mutex::new(()) })
     }
 
     /// The limits, which hold for grids that are computed, too.
@@ -60,6 +68,11 @@ impl Assets {
     /// The uploaded volumes.
     pub fn volumes(&self) -> &Store<Volume> {
         &self.volumes
+    }
+
+    /// The uploaded sinograms.
+    pub fn sinograms(&self) -> &Store<Sinogram> {
+        &self.sinograms
     }
 
     /// A built-in volume. It is built if it is not in memory.
@@ -103,7 +116,7 @@ impl Assets {
 
     /// The bytes of all uploaded files on disk, and of all decoded things in memory.
     pub fn sizes(&self) -> (u64, u64) {
-        (self.volumes.file_bytes(), lock(&self.cache).bytes())
+        (self.space.used(), lock(&self.cache).bytes())
     }
 }
 

@@ -7,6 +7,7 @@ use std::time::SystemTime;
 use super::cache::SharedCache;
 use super::folder::{Folder, Record, Records, id_of, is_id};
 use super::kind::Asset;
+use super::space::SharedSpace;
 use super::{AssetLimits, lock};
 use crate::error::{Error, Result};
 
@@ -16,6 +17,7 @@ pub struct Store<A: Asset> {
     limits: AssetLimits,
     records: Mutex<Records<A>>,
     cache: SharedCache,
+    space: SharedSpace,
     /// The lock for decoding and writing, one upload at a time. Many requests together then take no more memory than one, and the same content that
     /// is sent twice at once is stored once. It is taken before the other locks, never after.
     working: Mutex<()>,
@@ -26,9 +28,10 @@ impl<A: Asset> Store<A> {
     ///
     /// # Errors
     /// [`Error::Internal`] if the folder cannot be used.
-    pub(super) fn open(dir: &Path, limits: AssetLimits, cache: SharedCache) -> Result<Self> {
+    pub(super) fn open(dir: &Path, limits: AssetLimits, cache: SharedCache, space: SharedSpace) -> Result<Self> {
         let (folder, records) = Folder::open::<A>(dir)?;
-        Ok(Self { folder, limits, records: Mutex::new(records), cache, working: Mutex::new(()) })
+        records.values().for_each(|record| space.add(record.file_bytes));
+        Ok(Self { folder, limits, records: Mutex::new(records), cache, space, working: Mutex::new(()) })
     }
 
     /// Reads and keeps an upload. Returns it with its id, and true if it is new. The same content, read in the same way, is one upload, under the
@@ -42,7 +45,7 @@ impl<A: Asset> Store<A> {
         if lock(&self.records).contains_key(&id) {
             return Ok((self.decoded(&id)?, id, false));
         }
-        self.check_space(bytes.len() as u64)?;
+        let taken = self.space.take(bytes.len() as u64)?;
         let asset = Arc::new(A::read(&bytes, name, how.clone(), &self.limits)?);
         let created = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         let record = Record {
@@ -53,18 +56,10 @@ impl<A: Asset> Store<A> {
             created_unix_s: created.as_secs(),
         };
         self.folder.write(&id, &bytes, &record)?;
+        taken.keep();
         lock(&self.records).insert(id.clone(), record);
         lock(&self.cache).put(key::<A>(&id), &asset);
         Ok((asset, id, true))
-    }
-
-    fn check_space(&self, more: u64) -> Result<()> {
-        let held = self.file_bytes();
-        if held.saturating_add(more) > self.limits.max_store_bytes {
-            let what = format!("the store with these {more} bytes added to its {held}");
-            return Err(Error::TooLarge { what, limit: format!("{} bytes", self.limits.max_store_bytes) });
-        }
-        Ok(())
     }
 
     /// An upload. It is decoded again if it was forgotten.
@@ -134,14 +129,10 @@ impl<A: Asset> Store<A> {
         let _working = lock(&self.working);
         let record = self.record(id)?;
         self.folder.remove(id, &record)?;
+        self.space.free(record.file_bytes);
         lock(&self.records).remove(id);
         lock(&self.cache).remove(&key::<A>(id));
         Ok(())
-    }
-
-    /// The bytes of all uploaded files on disk.
-    pub(super) fn file_bytes(&self) -> u64 {
-        lock(&self.records).values().map(|record| record.file_bytes).sum()
     }
 
     fn cached(&self, id: &str) -> Option<Arc<A>> {

@@ -1,6 +1,5 @@
 //! The command line's side of the HTTP contract: it posts a scene, follows its frames, and fetches the last one.
 
-use std::path::Path;
 use std::time::Duration;
 
 use futures_util::StreamExt;
@@ -10,6 +9,12 @@ use crate::error::{Error, Result};
 
 /// The number of attempts while the queue is full.
 const RETRIES: u32 = 20;
+
+/// The id in a reply.
+async fn id_of(reply: reqwest::Response) -> Result<String> {
+    let reply: Value = reply.json().await.map_err(Error::internal)?;
+    reply["id"].as_str().map(str::to_owned).ok_or_else(|| Error::internal("the server gave no id"))
+}
 
 /// A client of a running server.
 pub struct Client {
@@ -59,16 +64,26 @@ impl Client {
         Err(Error::Unavailable("the server's queue stays full".into()))
     }
 
-    /// Uploads a volume file and returns its id.
+    /// Uploads a file to `path` and returns its id.
     ///
     /// # Errors
     /// The server's refusal in its words.
-    pub async fn upload(&self, path: &Path) -> Result<String> {
-        let bytes = tokio::fs::read(path).await.map_err(|e| Error::Malformed(format!("{}: {e}", path.display())))?;
-        let reply =
-            self.send(reqwest::Method::POST, "/v1/volumes", Some(bytes.into()), "application/octet-stream").await?;
-        let reply: Value = reply.json().await.map_err(Error::internal)?;
-        reply["id"].as_str().map(str::to_owned).ok_or_else(|| Error::internal("the server gave no id"))
+    pub async fn upload(&self, path: &str, bytes: Vec<u8>) -> Result<String> {
+        let reply = self.send(reqwest::Method::POST, path, Some(bytes.into()), "application/octet-stream").await?;
+        id_of(reply).await
+    }
+
+    /// Uploads a form of files to `path` and returns its id.
+    ///
+    /// # Errors
+    /// The server's refusal in its words.
+    pub async fn upload_form(&self, path: &str, form: reqwest::multipart::Form) -> Result<String> {
+        let mut request = self.http.post(format!("{}{path}", self.base)).multipart(form);
+        if let Some(token) = &self.token {
+            request = request.bearer_auth(token);
+        }
+        let reply = request.send().await.map_err(|e| Error::internal(format!("{}: {e}", self.base)))?;
+        if reply.status().is_success() { id_of(reply).await } else { Err(refusal(reply).await) }
     }
 
     /// Posts a render or an export to `path` and follows it to its end, event by event. Returns the bytes behind its `link`, and its resource.

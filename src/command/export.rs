@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use super::client::Client;
-use super::{Worker, insert, read_json};
+use super::inputs::Inputs;
+use super::{Worker, read_json};
 use crate::error::{Error, Result};
 use crate::job::State;
 
@@ -18,9 +19,8 @@ pub(super) struct Arguments {
     /// Where the file goes
     #[arg(short, long, default_value = "out.csv")]
     output: PathBuf,
-    /// Volume file to export, in place of the request's volume
-    #[arg(long)]
-    volume: Option<PathBuf>,
+    #[command(flatten)]
+    inputs: Inputs,
     #[command(flatten)]
     pub by: Worker,
 }
@@ -57,18 +57,14 @@ async fn export_there(
     bar: &ProgressBar,
 ) -> Result<(Vec<u8>, Value)> {
     let client = Client::new(server, args.by.token.clone())?;
-    if let Some(path) = &args.volume {
-        request["volume"] = json!({"id": client.upload(path).await?});
-    }
+    args.inputs.send(&client, &mut request).await?;
     client.run("/v1/exports", &request, "file", |event| show(bar, &event["progress"])).await
 }
 
 /// Runs the same code as the server, without the server.
 async fn export_here(args: &Arguments, mut request: Value, bar: &ProgressBar) -> Result<(Vec<u8>, Value)> {
     let service = args.by.service()?;
-    if let Some(path) = &args.volume {
-        request["volume"] = insert(&service, path)?;
-    }
+    args.inputs.insert(&service, &mut request)?;
     service.engine().ready().await?;
     let job = service.queue(service.prepare_export(request).await?);
     let mut updates = job.watch();

@@ -3,6 +3,7 @@
 mod client;
 mod devices;
 mod export;
+mod inputs;
 mod render;
 mod serve;
 mod study;
@@ -11,7 +12,7 @@ use std::net::SocketAddr;
 use std::path::Path;
 
 use clap::{Parser, Subcommand};
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use crate::config::{Config, DeviceArgs, Limits};
 use crate::device;
@@ -81,13 +82,6 @@ fn read_json(path: &Path) -> Result<Value> {
         if path == Path::new("-") { std::io::read_to_string(std::io::stdin()) } else { std::fs::read_to_string(path) };
     let text = text.map_err(|e| Error::Malformed(format!("{}: {e}", path.display())))?;
     serde_json::from_str(&text).map_err(|e| Error::Malformed(format!("{}: {e}", path.display())))
-}
-
-/// Stores a volume file and returns the request's value for `volume`.
-fn insert(service: &Service, path: &Path) -> Result<Value> {
-    let bytes = std::fs::read(path).map_err(|e| Error::Malformed(format!("{}: {e}", path.display())))?;
-    let name = path.file_name().map_or_else(|| "volume".into(), |n| n.to_string_lossy().into_owned());
-    Ok(json!({"id": service.assets().volumes().insert(bytes, &name, None)?.1}))
 }
 
 /// Runs the command. It must be called before any other thread is started.

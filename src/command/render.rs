@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use super::client::Client;
-use super::{Worker, insert, read_json};
+use super::inputs::Inputs;
+use super::{Worker, read_json};
 use crate::error::{Error, Result};
 use crate::job::State;
 
@@ -18,9 +19,8 @@ pub(super) struct Arguments {
     /// Where the PNG goes; a name that ends in .exr gets OpenEXR in linear floats
     #[arg(short, long, default_value = "out.png")]
     output: PathBuf,
-    /// Volume file to look at, in place of the scene's volume
-    #[arg(long)]
-    volume: Option<PathBuf>,
+    #[command(flatten)]
+    inputs: Inputs,
     #[command(flatten)]
     pub by: Worker,
 }
@@ -61,9 +61,7 @@ pub(super) async fn render(args: &Arguments) -> Result<()> {
 
 async fn render_there(args: &Arguments, server: &str, scene: &mut Value) -> Result<(Vec<u8>, Value)> {
     let client = Client::new(server, args.by.token.clone())?;
-    if let Some(path) = &args.volume {
-        scene["volume"] = json!({"id": client.upload(path).await?});
-    }
+    args.inputs.send(&client, scene).await?;
     let bar = bar(scene);
     let link = if args.wants_exr() { "exr" } else { "png" };
     let done = client
@@ -79,9 +77,7 @@ async fn render_there(args: &Arguments, server: &str, scene: &mut Value) -> Resu
 /// Runs the same code as the server, without the server.
 async fn render_here(args: &Arguments, scene: &mut Value) -> Result<(Vec<u8>, Value)> {
     let service = args.by.service()?;
-    if let Some(path) = &args.volume {
-        scene["volume"] = insert(&service, path)?;
-    }
+    args.inputs.insert(&service, scene)?;
     service.engine().ready().await?;
     let job = service.submit(scene.take()).await?;
     let bar = bar(job.request());

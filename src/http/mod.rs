@@ -2,15 +2,18 @@
 
 mod accept;
 mod exports;
+mod form;
 mod frames;
 mod guard;
 mod idempotency;
 mod info;
 mod openapi;
+mod operations;
 mod plans;
 mod problem;
 mod renders;
 mod routes;
+mod sinograms;
 mod streams;
 mod studies;
 mod viewer;

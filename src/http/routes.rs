@@ -13,7 +13,9 @@ use tower_http::cors::{AllowOrigin, Any, CorsLayer};
 use tower_http::trace::TraceLayer;
 
 use super::guard::{self, Tokens};
-use super::{App, exports, frames, info, openapi, plans, problem, renders, streams, studies, viewer, volumes};
+use super::{
+    App, exports, frames, info, openapi, plans, problem, renders, sinograms, streams, studies, viewer, volumes,
+};
 use crate::error::{Error, Result};
 
 /// Every route with its layers.
@@ -35,6 +37,10 @@ pub(super) fn router(app: App, tokens: Tokens, origins: &[String]) -> Result<Rou
         .route("/v1/exports/{id}/events", get(streams::export_events))
         .route("/v1/volumes", post(volumes::create).get(volumes::list))
         .route("/v1/volumes/{id}", get(volumes::show).delete(volumes::delete))
+        .route("/v1/sinograms", post(sinograms::create).get(sinograms::list))
+        .route("/v1/sinograms/{id}", get(sinograms::show).delete(sinograms::delete))
+        .route("/v1/sinograms/{id}/data", get(sinograms::data))
+        .route("/v1/sinograms/{id}/preview.png", get(sinograms::preview))
         .route("/v1/plan", post(plans::plan))
         .route("/v1/studies", get(studies::list))
         .route("/v1/studies/{id}", get(studies::show))

@@ -3,7 +3,7 @@
 use axum::Json;
 use axum::body::Body;
 use axum::extract::{Query, State};
-use axum::http::{Request, StatusCode, header};
+use axum::http::{HeaderMap, Request, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use percent_encoding::percent_decode_str;
 use serde_json::{Value, json};
@@ -24,9 +24,7 @@ pub(super) async fn create(State(app): State<App>, request: Request<Body>) -> Re
     let raw = query.parse()?;
     let (parts, body) = request.into_parts();
     refuse_forms(&parts.headers)?;
-    let name = parts.headers.get("x-filename").and_then(|v| v.to_str().ok()).unwrap_or("volume");
-    let name: String =
-        percent_decode_str(name).decode_utf8_lossy().chars().filter(|c| !c.is_control()).take(200).collect();
+    let name = file_name(&parts.headers, "volume");
     let _turn = app.uploads.acquire().await.map_err(Error::internal)?;
     let bytes =
         problem::read_body(&parts.headers, body, app.service.limits().max_body_bytes, app.request_timeout).await?;
@@ -39,8 +37,14 @@ pub(super) async fn create(State(app): State<App>, request: Request<Body>) -> Re
     Ok((status, [(header::LOCATION, location)], Json(VolumeInfo::of_upload(&id, &volume)?)).into_response())
 }
 
+/// The name of an upload, or `otherwise`.
+pub(super) fn file_name(headers: &HeaderMap, otherwise: &str) -> String {
+    let name = headers.get("x-filename").and_then(|v| v.to_str().ok()).unwrap_or(otherwise);
+    percent_decode_str(name).decode_utf8_lossy().chars().filter(|c| !c.is_control()).take(200).collect()
+}
+
 /// Refuses the body of a form by its type, since complaints about its bytes would not help.
-fn refuse_forms(headers: &axum::http::HeaderMap) -> Result<()> {
+fn refuse_forms(headers: &HeaderMap) -> Result<()> {
     let declared = headers.get(header::CONTENT_TYPE).and_then(|v| v.to_str().ok()).unwrap_or_default();
     // curl's --data-binary says x-www-form-urlencoded unless told otherwise, so that type is let through.
     if declared.starts_with("multipart/") || declared.starts_with("application/json") {

@@ -66,5 +66,5 @@ pub fn example() -> Value {
 fn parse(parameters: &Value, at: &str, assets: &Assets) -> Result<Arc<dyn Field>> {
     let Parameters { sinogram, grid, deconvolve } = request::read(parameters, at)?;
     let method = if deconvolve { Method::Deconvolved } else { Method::Plain };
-    Ok(Arc::new(Arc::new(Reconstruction::new(TECHNIQUE.name, &sinogram, &grid, method, assets.limits(), at)?)))
+    Ok(Arc::new(Arc::new(Reconstruction::new(TECHNIQUE.name, &sinogram, &grid, method, assets, at)?)))
 }

@@ -7,7 +7,7 @@
 //!
 //! | parameter | unit | range | default |
 //! |---|---|---|---|
-//! | `sinogram` | | a `projection` `of` a `phantom` by a `geometry` | Shepp and Logan's head of 100 mm; 360 parallel views of 256 bins of 1 mm |
+//! | `sinogram` | | the `id` of an upload, or a `projection` `of` a `phantom` by a `geometry` | Shepp and Logan's head of 100 mm; 360 parallel views of 256 bins of 1 mm |
 //! | `grid` | voxels, mm | `dims`, `spacing_mm`, `center_mm` | the bins' |
 //! | `filter` | | `ram_lak`, `shepp_logan`, `cosine`, `hamming`, `hann` | `ram_lak` |
 //! | `cutoff` | of the highest frequency | above 0, at most 1 | 1 |
@@ -80,5 +80,5 @@ pub fn example() -> Value {
 fn parse(parameters: &Value, at: &str, assets: &Assets) -> Result<Arc<dyn Field>> {
     let Parameters { sinogram, grid, filter, cutoff } = request::read(parameters, at)?;
     let method = Method::Filtered(filter, cutoff);
-    Ok(Arc::new(Arc::new(Reconstruction::new(TECHNIQUE.name, &sinogram, &grid, method, assets.limits(), at)?)))
+    Ok(Arc::new(Arc::new(Reconstruction::new(TECHNIQUE.name, &sinogram, &grid, method, assets, at)?)))
 }

@@ -20,6 +20,7 @@ pub(crate) mod majorant;
 pub mod optics;
 pub mod photon_transport;
 mod process;
+pub mod project;
 pub mod projection;
 pub mod scattering;
 pub mod single_scatter;
@@ -59,6 +60,7 @@ pub const ALL: &[Technique] = &[
     histogram::TECHNIQUE,
     isosurface::TECHNIQUE,
     photon_transport::TECHNIQUE,
+    project::TECHNIQUE,
     projection::TECHNIQUE,
     single_scatter::TECHNIQUE,
     slice::TECHNIQUE,

@@ -2,7 +2,10 @@
 //! angles, and its centroid moves as a cosine about the axis.
 
 use glam::{DMat3, DVec3};
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::Geometry;
 
 /// The moments of a view: the sum of its values, and of its values times their place, mm.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -16,6 +19,19 @@ pub struct Moments {
 }
 
 impl Moments {
+    /// The moments of a row of bins.
+    pub fn of_row(geometry: &Geometry, values: &[f64]) -> Self {
+        let ends = [values.first(), values.last()].into_iter().flatten();
+        Self {
+            sum: values.iter().sum(),
+            first: values.iter().enumerate().map(|(u, p)| geometry.place_mm(0, u as f64) * p).sum(),
+            greatest: [
+                values.iter().fold(0.0, |most, p| p.abs().max(most)),
+                ends.fold(0.0, |most, p| p.abs().max(most)),
+            ],
+        }
+    }
+
     /// Adds the moments of another row of the same view.
     pub fn add(&mut self, row: &Self) {
         self.sum += row.sum;
@@ -27,7 +43,7 @@ impl Moments {
 }
 
 /// What the moments of all views say.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct DataCheck {
     /// The standard deviation of the sums of views, as a part of their mean.
     pub sum_deviation: f64,

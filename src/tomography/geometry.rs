@@ -4,115 +4,8 @@
 //! spacing + offset. Data are u fastest, then v, then the view.
 
 use glam::DVec3;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 use super::Ray;
-use crate::error::{Error, Result};
-
-/// The most bins of a side of the detector, and the most views.
-const MOST_BINS: usize = 8192;
-const MOST_VIEWS: usize = 65_536;
-/// The most bins of all views together.
-const MOST_DATA: usize = 1 << 28;
-
-/// The geometry in a request.
-#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct GeometryRequest {
-    /// How rays go.
-    #[serde(rename = "type", default)]
-    kind: Kind,
-    /// The angles of the views, degrees.
-    #[serde(default)]
-    angles_deg: AnglesRequest,
-    /// The detector.
-    #[serde(default)]
-    detector: DetectorRequest,
-}
-
-/// How rays go.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Kind {
-    /// Parallel to each other, at right angles to the detector.
-    #[default]
-    Parallel,
-}
-
-/// The angles of the views.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(untagged)]
-pub enum AnglesRequest {
-    /// Each on its own. It stands before the other, which would take three numbers for its fields.
-    Each(#[schemars(length(min = 1, max = 65_536), inner(range(min = -36_000, max = 36_000)))] Vec<f64>),
-    /// Evenly spread ones.
-    Even(EvenAngles),
-}
-
-impl Default for AnglesRequest {
-    fn default() -> Self {
-        Self::Even(EvenAngles { from: 0.0, to: default_to(), count: default_views() })
-    }
-}
-
-/// Evenly spread angles.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct EvenAngles {
-    /// The first angle.
-    #[serde(default)]
-    #[schemars(range(min = -36_000, max = 36_000))]
-    from: f64,
-    /// The angle after the last.
-    #[serde(default = "default_to")]
-    #[schemars(range(min = -36_000, max = 36_000))]
-    to: f64,
-    /// The number of views.
-    #[serde(default = "default_views")]
-    #[schemars(range(min = 1, max = 65_536))]
-    count: usize,
-}
-
-fn default_to() -> f64 {
-    180.0
-}
-
-fn default_views() -> usize {
-    360
-}
-
-/// The detector in a request.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct DetectorRequest {
-    /// Bins along u and v.
-    #[serde(default = "default_count")]
-    #[schemars(inner(range(min = 1, max = 8192)))]
-    count: [usize; 2],
-    /// Their distances, mm.
-    #[serde(default = "default_spacing")]
-    #[schemars(inner(range(min = 1e-6, max = 1e6)))]
-    spacing_mm: [f64; 2],
-    /// The place of the detector's centre, mm.
-    #[serde(default)]
-    #[schemars(inner(range(min = -1e6, max = 1e6)))]
-    offset_mm: [f64; 2],
-}
-
-impl Default for DetectorRequest {
-    fn default() -> Self {
-        Self { count: default_count(), spacing_mm: default_spacing(), offset_mm: [0.0; 2] }
-    }
-}
-
-fn default_count() -> [usize; 2] {
-    [256, 1]
-}
-
-fn default_spacing() -> [f64; 2] {
-    [1.0; 2]
-}
 
 /// A valid geometry.
 #[derive(Debug, Clone, PartialEq)]
@@ -123,45 +16,12 @@ pub struct Geometry {
     offset_mm: [f64; 2],
 }
 
-impl GeometryRequest {
-    /// Checks the geometry.
-    ///
-    /// # Errors
-    /// [`Error::Invalid`] with a pointer under `at`; [`Error::TooLarge`] for more bins than a sinogram may have.
-    pub fn resolve(&self, at: &str) -> Result<Geometry> {
-        let Kind::Parallel = self.kind;
-        let degrees: Vec<f64> = match &self.angles_deg {
-            AnglesRequest::Each(angles) => angles.clone(),
-            AnglesRequest::Even(even) => {
-                if even.count > 1 && even.from == even.to {
-                    let detail = format!("all {} views have one angle", even.count);
-                    return Err(Error::invalid(format!("{at}/angles_deg/to"), detail, "another angle than from"));
-                }
-                (0..even.count).map(|i| even.from + (even.to - even.from) * i as f64 / even.count as f64).collect()
-            }
-        };
-        if degrees.is_empty() || degrees.len() > MOST_VIEWS || degrees.iter().any(|angle| !angle.is_finite()) {
-            let permitted = format!("1 to {MOST_VIEWS} finite angles");
-            return Err(Error::invalid(format!("{at}/angles_deg"), "these are no views", permitted));
-        }
-        let DetectorRequest { count, spacing_mm, offset_mm } = self.detector;
-        if count.iter().any(|n| !(1..=MOST_BINS).contains(n)) {
-            let permitted = format!("1 to {MOST_BINS}");
-            return Err(Error::invalid(format!("{at}/detector/count"), "no such detector", permitted));
-        }
-        let data = count[0].saturating_mul(count[1]).saturating_mul(degrees.len());
-        if data > MOST_DATA {
-            return Err(Error::TooLarge {
-                what: format!("a sinogram of {data} bins"),
-                limit: format!("{MOST_DATA} bins"),
-            });
-        }
-        let angles = degrees.into_iter().map(f64::to_radians).collect();
-        Ok(Geometry { angles, count, spacing_mm, offset_mm })
-    }
-}
-
 impl Geometry {
+    /// Views at `angles`, radians, of bins along u and v.
+    pub(super) fn new(angles: Vec<f64>, count: [usize; 2], spacing_mm: [f64; 2], offset_mm: [f64; 2]) -> Self {
+        Self { angles, count, spacing_mm, offset_mm }
+    }
+
     /// The angles of the views, radians.
     pub fn angles(&self) -> &[f64] {
         &self.angles
@@ -199,6 +59,20 @@ impl Geometry {
         Ray { origin: DVec3::new(u * cos, u * sin, v), direction: DVec3::new(-sin, cos, 0.0) }
     }
 
+    /// What a bin along u, and one along v, add to a ray's place, mm.
+    pub fn bin_steps(&self, view: usize) -> [DVec3; 2] {
+        let (sin, cos) = self.angles[view].sin_cos();
+        let [du, dv] = self.spacing_mm;
+        [DVec3::new(du * cos, du * sin, 0.0), DVec3::new(0.0, 0.0, dv)]
+    }
+
+    /// True if a point, mm, is projected to the detector in a view: to one of its bins, or within half a bin of them.
+    pub fn sees(&self, view: usize, point: DVec3) -> bool {
+        let (sin, cos) = self.angles[view].sin_cos();
+        let places = [point.x * cos + point.y * sin, point.z];
+        (0..2).all(|side| (-0.5..=self.count[side] as f64 - 0.5).contains(&self.bin(side, places[side])))
+    }
+
     /// The weights Δθ of the views in an integral over half a turn, and the widest gap that no view covers, radians.
     ///
     /// A ray is the same from both sides, so angles count modulo π. A view stands for half of both gaps to its neighbours. A gap of more than
@@ -232,6 +106,7 @@ mod tests {
     use serde_json::json;
 
     use super::*;
+    use crate::tomography::GeometryRequest;
 
     fn geometry(angles: serde_json::Value) -> Geometry {
         let request: GeometryRequest = serde_json::from_value(json!({"angles_deg": angles})).expect("a geometry");

@@ -7,6 +7,7 @@
 //! **Values** are `raw · slope + inter`. Voxels stay in the type of their file, so that a byte volume takes a byte a voxel on the device
 //! too. Floats are taken as words of 16 bits if a view needs no more (`words.rs`).
 
+mod array;
 mod away;
 mod bright;
 pub mod builtin;
@@ -31,6 +32,7 @@ mod values;
 mod voxels;
 mod words;
 
+pub use array::Array;
 pub use away::{DeviceGrid, GridStatistics};
 pub use contents::{Contents, DataKind, is_hounsfield};
 pub use indexed::{Indexed, MOST_VALUES};

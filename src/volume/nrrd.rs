@@ -158,7 +158,8 @@ fn length_unit(header: &Header, axes: &Axes) -> (f64, Option<String>) {
     (known.unwrap_or(1.0), known.is_none().then(note))
 }
 
-fn endian(header: &Header, raw: RawType) -> Result<Endian> {
+/// The byte order, which one-byte values need not have.
+pub(super) fn endian(header: &Header, raw: RawType) -> Result<Endian> {
     match header.get("endian").map(str::to_ascii_lowercase).as_deref() {
         Some("little") => Ok(Endian::Little),
         Some("big") => Ok(Endian::Big),
@@ -168,7 +169,7 @@ fn endian(header: &Header, raw: RawType) -> Result<Endian> {
 }
 
 /// The data, after the lines and bytes to be skipped. In gzip data, lines are skipped before inflating and bytes after.
-fn data<'a>(header: &Header, bytes: &'a [u8], announced: u64) -> Result<Source<'a>> {
+pub(super) fn data<'a>(header: &Header, bytes: &'a [u8], announced: u64) -> Result<Source<'a>> {
     let mut rest = bytes.get(header.data_at..).unwrap_or_default();
     for _ in 0..header.integer("line skip", 0)?.max(0) {
         let end = rest.iter().position(|&byte| byte == b'\n');

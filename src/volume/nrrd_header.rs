@@ -10,6 +10,8 @@ const MAX_HEADER: usize = 1 << 20;
 /// The fields of a header.
 pub(super) struct Header {
     fields: HashMap<String, String>,
+    /// The sender's own annotations.
+    keys: HashMap<String, String>,
     /// The offset of the data.
     pub data_at: usize,
 }
@@ -17,7 +19,7 @@ pub(super) struct Header {
 impl Header {
     /// Parses the lines up to the first blank one.
     pub fn parse(bytes: &[u8]) -> Result<Self> {
-        let mut fields = HashMap::new();
+        let (mut fields, mut keys) = (HashMap::new(), HashMap::new());
         let mut at = 0;
         let magic = next_line(bytes, &mut at).unwrap_or_default();
         if !matches!(magic.as_str(), "NRRD0001" | "NRRD0002" | "NRRD0003" | "NRRD0004" | "NRRD0005") {
@@ -25,7 +27,7 @@ impl Header {
         }
         while let Some(line) = next_line(bytes, &mut at) {
             if line.is_empty() {
-                return Ok(Self { fields, data_at: at });
+                return Ok(Self { fields, keys, data_at: at });
             }
             if line.starts_with('#') {
                 continue;
@@ -35,7 +37,8 @@ impl Header {
                 return Err(Error::invalid("header:", format!("the line '{start}' is no field"), "field: value"));
             };
             // `key:=value` is the sender's own annotation.
-            if value.starts_with('=') {
+            if let Some(value) = value.strip_prefix('=') {
+                keys.insert(field.to_owned(), value.trim().to_owned());
                 continue;
             }
             let field = canonical(field);
@@ -53,6 +56,11 @@ impl Header {
     /// A field's text; `name` may hold spaces, as in the format's definition.
     pub fn get(&self, name: &str) -> Option<&str> {
         self.fields.get(&canonical(name)).map(String::as_str)
+    }
+
+    /// The pairs `key:=value`.
+    pub fn into_keys(self) -> HashMap<String, String> {
+        self.keys
     }
 
     /// A field that must be there.

@@ -1,4 +1,4 @@
-//! The list of requests in `tests/requests/*.json`, and the volumes that it calls `{"test": NAME}`.
+//! The list of requests in `tests/requests/*.json`, and the volumes and the sinogram that it calls `{"test": NAME}`.
 //!
 //! Every entry has a name of its own. Most are render requests. The others have `calls`, which are sent to a server, one after the other. `./dev
 //! compare` sends all of them to two servers, and tests render those that end in a picture.
@@ -100,6 +100,26 @@ pub const VOLUMES: [&str; 18] = [
     "long", "needles", "plate", "flat", "falling",
 ];
 
+/// The name of the test sinogram.
+pub const SINOGRAM: &str = "sinogram";
+
+/// The upload of the test sinogram: a NRRD of the counts behind two discs.
+pub fn sinogram() -> Vec<u8> {
+    let (views, bins) = (45, 48);
+    let chord = |u: f64, radius: f64| 2.0 * (radius * radius - u * u).max(0.0).sqrt();
+    let count = |i: usize| {
+        let (angle, u) = ((i / bins) as f64 * std::f64::consts::PI / views as f64, (i % bins) as f64 - 23.5);
+        let small = u - 7.0 * angle.cos() + 4.0 * angle.sin();
+        (1000.0 * (-0.03 * chord(u, 18.0) - 0.05 * chord(small, 5.0)).exp()).round() as u16
+    };
+    let geometry = r#"{"angles_deg": {"to": 180, "count": 45}, "detector": {"count": [48, 1]}}"#;
+    let header = format!(
+        "NRRD0005\ntype: uint16\ndimension: 2\nsizes: {bins} {views}\nendian: little\nencoding: raw\n\
+         geometry:={geometry}\nquantity:=counts\nphotons_per_ray:=1000\n\n"
+    );
+    header.into_bytes().into_iter().chain((0..views * bins).flat_map(|i| count(i).to_le_bytes())).collect()
+}
+
 /// The upload of a test volume: its bytes, and the way to read them, if they do not tell it themselves.
 pub fn upload(name: &str) -> (Vec<u8>, RawQuery) {
     let dims @ [wide, high, deep] = if name == "plate" { [24, 20, 1] } else { [24, 20, 22] };
@@ -173,6 +193,9 @@ pub fn with_ids(request: &Value, id: &dyn Fn(&str) -> String) -> Value {
 /// The request with the ids that test volumes have in a house.
 pub fn with_volumes(request: &Value, house: &House) -> Value {
     with_ids(request, &|name| {
+        if name == SINOGRAM {
+            return house.assets().sinograms().insert(sinogram(), name, None).unwrap().1;
+        }
         let (bytes, query) = upload(name);
         house.assets().volumes().insert(bytes, name, query.parse().unwrap()).unwrap().1
     })

@@ -16,6 +16,7 @@ mod isosurface;
 mod levels;
 mod photon_transport;
 mod pictures;
+mod project;
 mod projection;
 mod scales;
 mod single_scatter;

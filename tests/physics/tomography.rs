@@ -1,6 +1,7 @@
 //! What tests of reconstructions share, and requests that are refused.
 
 mod refused;
+mod sinograms;
 
 use cloudchamber::tomography::{Phantom, PhantomRequest};
 use glam::DVec3;

@@ -9,5 +9,6 @@ mod openapi;
 mod plans;
 mod renders;
 mod scattering;
+mod sinograms;
 mod studies;
 mod uploads;

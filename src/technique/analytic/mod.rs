@@ -1,6 +1,7 @@
 //! Analytic reconstruction: what backprojection and filtered backprojection share. Views are taken a block at a time: the host projects and filters
 //! them, and the device adds them to the grid (`kernels/shared/backproject.h`).
 
+mod data;
 mod deconvolve;
 mod process;
 mod request;
@@ -13,7 +14,7 @@ use serde_json::{Value, json};
 
 use super::case::{Case, Cases};
 use super::{Field, Look, Process};
-use crate::asset::AssetLimits;
+use crate::asset::Assets;
 use crate::device::Device;
 use crate::device::numbers::define;
 use crate::device::program::{Source, Variant};
@@ -21,7 +22,8 @@ use crate::device::structs::DeviceStruct;
 use crate::device_struct;
 use crate::error::{Error, Result};
 use crate::scene::bounds::Bounds;
-use crate::tomography::{Filter, Geometry, Phantom};
+use crate::tomography::{Filter, Geometry};
+use data::Data;
 use process::Run;
 use request::check_voxels;
 pub use request::{GridRequest, SinogramRequest};
@@ -78,7 +80,7 @@ pub(super) fn source(kernel: &'static str, variants: fn() -> Vec<Variant>) -> So
 pub(super) struct Reconstruction {
     /// The technique's name, which is that of its kernel.
     pub technique: &'static str,
-    pub phantom: Phantom,
+    pub data: Data,
     pub geometry: Geometry,
     pub dims: [usize; 3],
     pub spacing_mm: [f64; 3],
@@ -119,13 +121,13 @@ impl Reconstruction {
         sinogram: &SinogramRequest,
         grid: &GridRequest,
         method: Method,
-        limits: &AssetLimits,
+        assets: &Assets,
         at: &str,
     ) -> Result<Self> {
-        let (phantom, geometry) = sinogram.resolve(&format!("{at}/sinogram"))?;
+        let (data, geometry) = sinogram.resolve(assets, &format!("{at}/sinogram"))?;
         let (dims, spacing_mm, center_mm) = grid.resolve(&geometry);
-        let made = Self { technique, phantom, geometry, dims, spacing_mm, center_mm, method };
-        check_voxels(made.computed(), limits)?;
+        let made = Self { technique, data, geometry, dims, spacing_mm, center_mm, method };
+        check_voxels(made.computed(), assets.limits())?;
         if made.planes_seen() == 0 {
             let permitted = "planes within half a bin of the detector's rows";
             return Err(Error::invalid(

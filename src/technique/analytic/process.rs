@@ -69,7 +69,7 @@ impl Run {
     fn make(&mut self, device: &Device) -> Result<()> {
         let [bins, rows] = self.of.geometry.count();
         let (all, first) = (self.block.views * rows, self.done * rows);
-        let some = (RAYS / (bins * self.of.phantom.shapes())).max(1).min(all - self.block.rows_made);
+        let some = (RAYS / (bins * self.of.data.work())).max(1).min(all - self.block.rows_made);
         let from = first + self.block.rows_made;
         let (made, moments) = self.rows.make(&self.of, from..from + some)?;
         for (row, of_row) in (from..).zip(moments) {
@@ -149,6 +149,9 @@ impl Run {
         let check = DataCheck::of(angles, &self.moments);
         let mut warnings: Vec<Value> = Vec::new();
         let mut warn = |code: &str, message: String| warnings.push(json!({"code": code, "message": message}));
+        for note in self.of.data.notes() {
+            warn("readings", note.clone());
+        }
         if let Some(check) = &check {
             for (code, message) in check.warnings(self.of.geometry.spacing_mm()[0]) {
                 warn(code, message);

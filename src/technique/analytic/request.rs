@@ -3,7 +3,8 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::asset::AssetLimits;
+use super::Data;
+use crate::asset::{AssetLimits, Assets};
 use crate::error::{Error, Result};
 use crate::tomography::{Geometry, GeometryRequest, Phantom, PhantomRequest};
 
@@ -15,9 +16,10 @@ const MOST_VOXELS: usize = 1 << 28;
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SinogramRequest {
+    /// The id of an upload.
+    id: Option<String>,
     /// A measurement that is made for it, without noise.
-    #[serde(default)]
-    projection: ProjectionRequest,
+    projection: Option<ProjectionRequest>,
 }
 
 /// A measurement.
@@ -55,18 +57,31 @@ pub struct GridRequest {
 }
 
 impl SinogramRequest {
-    /// The phantom and the geometry.
+    /// The data and their geometry.
     ///
     /// # Errors
     /// [`Error::Invalid`] with a pointer under `at`.
-    pub(in crate::technique) fn resolve(&self, at: &str) -> Result<(Phantom, Geometry)> {
+    pub(in crate::technique) fn resolve(&self, assets: &Assets, at: &str) -> Result<(Data, Geometry)> {
+        if let Some(id) = &self.id {
+            if self.projection.is_some() {
+                return Err(Error::invalid(
+                    format!("{at}/projection"),
+                    "there is an id, too",
+                    "one of id and projection",
+                ));
+            }
+            let sinogram = assets.sinograms().named(id, &format!("{at}/id"))?;
+            let geometry = sinogram.geometry().clone();
+            return Ok((Data::Measured(sinogram), geometry));
+        }
         let at = format!("{at}/projection");
-        let geometry = self.projection.geometry.resolve(&format!("{at}/geometry"))?;
-        let phantom = match &self.projection.of {
+        let projection = self.projection.clone().unwrap_or_default();
+        let geometry = projection.geometry.resolve(&format!("{at}/geometry"))?;
+        let phantom = match &projection.of {
             Some(of) => of.phantom.resolve(&format!("{at}/of/phantom"))?,
             None => Phantom::shepp_logan(),
         };
-        Ok((phantom, geometry))
+        Ok((Data::Exact(phantom), geometry))
     }
 }
 

@@ -43,16 +43,8 @@ impl Rows {
     fn row(&self, of: &Reconstruction, row: usize) -> Result<(Vec<f32>, Moments)> {
         let [bins, rows] = of.geometry.count();
         let (view, v) = (row / rows, row % rows);
-        let values: Vec<f64> = (0..bins).map(|u| of.phantom.integral(&of.geometry.ray(view, [u, v]))).collect();
-        let place = |u: usize| of.geometry.place_mm(0, u as f64);
-        let moments = Moments {
-            sum: values.iter().sum(),
-            first: values.iter().enumerate().map(|(u, p)| place(u) * p).sum(),
-            greatest: [
-                values.iter().fold(0.0, |most, p| p.abs().max(most)),
-                values[0].abs().max(values[bins - 1].abs()),
-            ],
-        };
+        let values = of.data.row(&of.geometry, view, v);
+        let moments = Moments::of_row(&of.geometry, &values);
         let filtered = self.filtering.as_ref().map_or(Ok(values.clone()), |filtering| filtering.of(&values))?;
         let mut padded = vec![0.0; bins + 2 * MARGIN];
         for (to, value) in padded[MARGIN..].iter_mut().zip(filtered) {
