@@ -84,11 +84,12 @@ export async function call(path, { method = 'GET', body, headers = {}, accept = 
         cache: 'no-store',
         headers: {
           Accept: accept,
-          ...(payload === undefined ? {} : { 'Content-Type': 'application/json' }),
+          // The browser itself says what a form is.
+          ...(payload === undefined || payload instanceof FormData ? {} : { 'Content-Type': 'application/json' }),
           ...authorization(),
           ...headers,
         },
-        body: payload === undefined ? undefined : JSON.stringify(payload),
+        body: payload === undefined || payload instanceof FormData ? payload : JSON.stringify(payload),
       });
     } catch (error) {
       if (signal?.aborted || error.name === 'AbortError') throw error;

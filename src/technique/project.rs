@@ -9,7 +9,7 @@
 //!
 //! | parameter | unit | range | default |
 //! |---|---|---|---|
-//! | `geometry` | mm, degrees | as that of an upload | 180 views over half a turn; bins as wide as voxels, enough to see all of the box |
+//! | `geometry` | mm, degrees | as that of an upload | what it does not say: 180 views over half a turn; bins as wide as voxels, enough to see all of the box |
 //! | `projector` | | `joseph` | `joseph` |
 //!
 //! The file is NRRD, which says its geometry: it may be posted to `/v1/sinograms` as it is. Voxels without a value count as 0, with a warning. Places are
@@ -94,8 +94,9 @@ device_struct! {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Parameters {
-    /// Where each bin of each view looks.
-    geometry: Option<GeometryRequest>,
+    /// Where each bin of each view looks. What it does not say is made for the volume.
+    #[serde(default)]
+    geometry: GeometryRequest,
     /// How the volume is integrated along a ray.
     #[serde(default)]
     projector: Projector,
@@ -117,13 +118,9 @@ pub fn example() -> Value {
 }
 
 fn cases() -> Cases {
-    let tiny = |resolution: u32, own: Value| json!({"technique": TECHNIQUE.name, "volume": {"builtin": "sphere", "resolution": resolution}, TECHNIQUE.name: own});
+    let tiny = |own: Value| json!({"technique": TECHNIQUE.name, "volume": {"builtin": "sphere", "resolution": 8}, TECHNIQUE.name: own});
     let few = |count: [usize; 2]| json!({"geometry": {"angles_deg": [0, 40, 90, 130], "detector": {"count": count, "spacing_mm": [0.3, 0.4]}}});
-    Cases {
-        all: vec![Case::from(few([9, 3]))],
-        tiny: vec![tiny(6, few([9, 3])), tiny(1, few([5, 1]))],
-        ..Cases::default()
-    }
+    Cases { all: vec![Case::from(few([9, 3]))], tiny: vec![tiny(few([9, 3])), tiny(few([5, 1]))], ..Cases::default() }
 }
 
 fn source() -> Source {
@@ -140,33 +137,25 @@ fn variant(voxel: VoxelType) -> Variant {
     Variant::new(TECHNIQUE.name, Some(voxel), &[])
 }
 
-/// A valid projection. A geometry that is not given is made for the subject.
+/// A valid projection.
 #[derive(Debug, Clone)]
 struct Projection {
-    given: Option<(GeometryRequest, Geometry)>,
+    asked: GeometryRequest,
 }
 
 fn parse(parameters: &Value, at: &str, _: &Assets) -> Result<Arc<dyn Export>> {
-    let Parameters { geometry, projector: Projector::Joseph } = request::read(parameters, at)?;
-    let resolve = |asked: GeometryRequest| -> Result<_> {
-        let geometry = asked.resolve(&format!("{at}/geometry"))?;
-        Ok((asked.of_data(geometry.views(), geometry.count()), geometry))
-    };
-    Ok(Arc::new(Projection { given: geometry.map(resolve).transpose()? }))
+    let Parameters { geometry: asked, projector: Projector::Joseph } = request::read(parameters, at)?;
+    asked.resolve(&format!("{at}/geometry"))?;
+    Ok(Arc::new(Projection { asked }))
 }
 
 impl Projection {
-    /// The geometry, and how it is said.
+    /// The geometry for a subject, and how it is said.
     fn geometry(&self, bounds: &Bounds) -> Result<(GeometryRequest, Geometry)> {
-        if let Some(given) = &self.given {
-            return Ok(given.clone());
-        }
         // All of the box is seen from all sides.
         let half = |along: fn(DVec3) -> f64| bounds.corners().into_iter().map(along).fold(0.0, f64::max);
-        let (wide, high) = (half(|p| p.truncate().length()), half(|p| p.z.abs()));
-        let spacing = bounds.smallest_side();
-        let bins = [wide, high].map(|half| ((2.0 * half / spacing).ceil() as usize).max(1));
-        let asked = GeometryRequest::of_bins(bins, [spacing; 2]).of_data(VIEWS, bins);
+        let size = [half(|p| p.truncate().length()), half(|p| p.z.abs())].map(|half| 2.0 * half);
+        let asked = self.asked.clone().seeing(size, bounds.smallest_side(), VIEWS);
         let geometry = asked.resolve("/project/geometry")?;
         Ok((asked, geometry))
     }

@@ -67,7 +67,7 @@ pub struct EvenAngles {
     #[serde(default = "default_to")]
     #[schemars(range(min = -36_000, max = 36_000))]
     to: f64,
-    /// The number of views. Default: 360, or that of the data.
+    /// The number of views. Default: 360, or that of the data, or 180 of a projected volume.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 65_536))]
     count: Option<usize>,
@@ -79,48 +79,43 @@ fn default_to() -> f64 {
 
 /// The number of views of which nothing is said.
 const VIEWS: usize = 360;
-/// Bins along u and v of a detector of which nothing is said.
+/// Bins along u and v of a detector of which nothing is said, and their distances.
 const BINS: [usize; 2] = [256, 1];
+const SPACING_MM: [f64; 2] = [1.0; 2];
 
 /// The detector in a request.
-#[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct DetectorRequest {
-    /// Bins along u and v. Default: 256 and 1, or those of the data.
+    /// Bins along u and v. Default: 256 and 1, or those of the data, or as many as see all of a projected volume.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(inner(range(min = 1, max = 8192)))]
     count: Option<[usize; 2]>,
-    /// Their distances, mm.
-    #[serde(default = "default_spacing")]
+    /// Their distances, mm. Default: 1, or of a projected volume the smallest side of its voxels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(inner(range(min = 1e-6, max = 1e6)))]
-    spacing_mm: [f64; 2],
+    spacing_mm: Option<[f64; 2]>,
     /// The place of the detector's centre, mm.
     #[serde(default)]
     #[schemars(inner(range(min = -1e6, max = 1e6)))]
     offset_mm: [f64; 2],
 }
 
-impl Default for DetectorRequest {
-    fn default() -> Self {
-        Self { count: None, spacing_mm: default_spacing(), offset_mm: [0.0; 2] }
-    }
-}
-
-fn default_spacing() -> [f64; 2] {
-    [1.0; 2]
-}
-
 impl GeometryRequest {
-    /// Half a turn of views of so many bins, at these distances.
-    pub fn of_bins(bins: [usize; 2], spacing_mm: [f64; 2]) -> Self {
-        let detector = DetectorRequest { count: Some(bins), spacing_mm, ..DetectorRequest::default() };
-        Self { detector, ..Self::default() }
+    /// The same for an object of a size along u and v, mm: what it does not say sees all of that, by so many views of bins of this side.
+    #[must_use]
+    pub fn seeing(mut self, size_mm: [f64; 2], side_mm: f64, views: usize) -> Self {
+        let spacing = *self.detector.spacing_mm.get_or_insert([side_mm; 2]);
+        let bins = |side: usize| ((size_mm[side] / spacing[side]).ceil() as usize).max(1);
+        let bins = self.detector.count.unwrap_or([bins(0), bins(1)]);
+        self.of_data(views, bins)
     }
 
     /// The same for data of so many views and bins: what it does not say is theirs.
     #[must_use]
     pub fn of_data(mut self, views: usize, bins: [usize; 2]) -> Self {
         self.detector.count.get_or_insert(bins);
+        self.detector.spacing_mm.get_or_insert(SPACING_MM);
         if let AnglesRequest::Even(even) = &mut self.angles_deg {
             even.count.get_or_insert(views);
         }
@@ -158,7 +153,7 @@ impl GeometryRequest {
             return Err(Error::invalid(format!("{at}/angles_deg"), "these are no views", permitted));
         }
         let DetectorRequest { count, spacing_mm, offset_mm } = self.detector;
-        let count = count.unwrap_or(BINS);
+        let (count, spacing_mm) = (count.unwrap_or(BINS), spacing_mm.unwrap_or(SPACING_MM));
         if count.iter().any(|n| !(1..=MOST_BINS).contains(n)) {
             let permitted = format!("1 to {MOST_BINS}");
             return Err(Error::invalid(format!("{at}/detector/count"), "no such detector", permitted));

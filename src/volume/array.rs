@@ -172,7 +172,7 @@ mod tests {
     fn npy(descr: &str, in_columns: bool, shape: &str, data: &[u8]) -> Vec<u8> {
         let order = if in_columns { "True" } else { "False" };
         let mut header = format!("{{'descr': '{descr}', 'fortran_order': {order}, 'shape': {shape}, }}");
-        while (NPY.len() + 4 + header.len() + 1) % 64 != 0 {
+        while !(NPY.len() + 4 + header.len() + 1).is_multiple_of(64) {
             header.push(' ');
         }
         header.push('\n');

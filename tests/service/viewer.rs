@@ -235,6 +235,38 @@ async fn the_charts_page_shows_what_was_measured() {
     page.close().await;
 }
 
+/// A volume is projected, its sinogram is looked at, and it is reconstructed beside it; a wrong upload is told in words.
+#[tokio::test(flavor = "multi_thread")]
+async fn the_tomography_page_projects_and_reconstructs() {
+    let page = Page::open(DESKTOP).await;
+    page.settled().await;
+    page.find("header a[href='tomography.html']").await.click().await.expect("the link to tomography");
+    page.until("the volumes", "document.querySelectorAll('#volume option').length > 5").await;
+    page.js("document.querySelector('#measured-views').value = 40").await;
+    page.find("#measure button").await.click().await.expect("the button");
+    page.until("a sinogram", "document.querySelector('#preview').naturalHeight === 40").await;
+    page.until("a reconstruction", "document.querySelector('#facts').textContent.startsWith('40 views')").await;
+    let picture = "document.querySelector('#reconstruction')";
+    assert_eq!(page.js(&format!("return {picture}.naturalWidth")).await, 384);
+    page.js(&format!("window.before = {picture}.src")).await;
+    page.find("#technique").await.select_by_value("backprojection").await.expect("another method");
+    page.until(
+        "another picture",
+        &format!("{picture}.alt.startsWith('backprojection') && {picture}.src !== window.before"),
+    )
+    .await;
+    page.js(
+        "document.querySelector('#view').value = 3; document.querySelector('#view').dispatchEvent(new Event('input'))",
+    )
+    .await;
+    page.until("a view", "document.querySelector('#view-words').textContent.startsWith('View 3')").await;
+    page.js("const files = new DataTransfer(); files.items.add(new File(['no numbers'], 'wrong.npy'));
+         document.querySelector('#data').files = files.files; document.querySelector('#upload button').click()")
+        .await;
+    page.until("a refusal in words", "document.querySelector('#alert').textContent.includes('NumPy')").await;
+    page.close().await;
+}
+
 /// With the box ticked, the planner chooses, and the page shows its choice and its reasons. Without, nothing is planned.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_ticked_box_leaves_the_settings_to_the_planner() {
