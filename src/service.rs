@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::asset::Assets;
 use crate::config::Limits;
@@ -101,6 +101,20 @@ impl Service {
         self.load(request, None, task).await
     }
 
+    /// Queues a projection, whose file becomes a sinogram with an id. `request` is that of the export.
+    ///
+    /// # Errors
+    /// As [`Service::prepare_export`].
+    pub async fn project(&self, request: Value) -> Result<Arc<Job>> {
+        let task = |service: &Self, request: &Value| {
+            let task = ExportTask::from_json(request, service.assets(), service.limits());
+            task.map(|task| Task::File(Box::new(task.kept())))
+        };
+        let job = self.queue(self.load(request, None, task).await?);
+        tokio::spawn(keep(self.clone(), job.clone()));
+        Ok(job)
+    }
+
     async fn load(
         &self,
         request: Value,
@@ -156,5 +170,21 @@ impl Service {
             State::Done => Ok(job.clone()),
             _ => Err(job.failure().unwrap_or_else(|| Error::Conflict("it was cancelled".into()))),
         }
+    }
+}
+
+/// Waits for the file of a projection, and ends the export once that is a sinogram of the store.
+async fn keep(service: Service, job: Arc<Job>) {
+    let mut updates = job.watch();
+    let ended = updates.wait_for(|update| update.is_handed_over || update.state.is_terminal()).await.map(drop);
+    let Some(mut file) = ended.ok().and_then(|()| job.handed_over()) else { return };
+    let bytes = file.bytes.to_vec();
+    let stored = tokio::task::spawn_blocking(move || service.assets().sinograms().insert(bytes, "projection", None));
+    match stored.await.map_err(Error::internal).and_then(|stored| stored) {
+        Ok((_, id, _)) => {
+            file.result["sinogram"] = json!({"id": id});
+            job.finish_file(file);
+        }
+        Err(error) => drop(job.fail(&error)),
     }
 }

@@ -7,6 +7,12 @@ import { make } from './widgets.js';
 const byId = (id) => document.getElementById(id);
 const METHODS = ['fbp', 'backprojection'];
 const SIDE = 384;
+/** What is measured exactly: phantoms, with the detectors that see them. */
+const head = (dimensions) => ({ phantom: { name: 'shepp_logan', dimensions, radius_mm: 100 } });
+const PHANTOMS = [
+  ['Shepp and Logan’s head, exactly', { of: head(2), geometry: { detector: { count: [256, 1] } } }],
+  ['The same in three dimensions', { of: head(3), geometry: { detector: { count: [128, 96], spacing_mm: [2, 2] } } }],
+];
 
 /** A number with three digits. */
 const short = (value) => String(Number(Number(value).toPrecision(3)));
@@ -41,7 +47,7 @@ let shown = null;
 async function listSinograms(chosen) {
   const { sinograms } = await json('v1/sinograms');
   byId('sinogram').replaceChildren(...sinograms.toReversed().map(({ id, name, views, bins }) =>
-    option(id, `${name}: ${views} views of ${bins[0]}${bins[1] > 1 ? ` × ${bins[1]}` : ''} bins`)));
+    option(id, `${name}, ${views} × ${bins.join(' × ')}`)));
   if (chosen) byId('sinogram').value = chosen;
   if (byId('sinogram').value) await chooseSinogram();
 }
@@ -96,17 +102,14 @@ async function reconstruct() {
   });
 }
 
-/** Projects a volume, and keeps the file as a sinogram. */
+/** Measures what is chosen, and keeps the sinogram. */
 async function measure(isNewest) {
   const angles = { from: 0, to: Number(byId('measured-to').value), count: Number(byId('measured-views').value) };
-  const volume = JSON.parse(byId('volume').value);
-  const request = { technique: 'project', volume, project: { geometry: { angles_deg: angles } } };
-  const { links } = await json('v1/exports', { method: 'POST', body: request });
-  const file = await (await call(`${links.file.slice(1)}?wait=final`, { accept: '*/*' })).blob();
-  const body = new FormData();
-  body.append('data', file, `${byId('volume').selectedOptions[0].textContent}, ${angles.count} views`);
-  const { id } = await json('v1/sinograms', { method: 'POST', body });
-  if (isNewest()) await listSinograms(id);
+  const { of, geometry } = JSON.parse(byId('volume').value);
+  const { links } = await json('v1/projections', { method: 'POST', body: { of, geometry: { ...geometry, angles_deg: angles } } });
+  await call(`${links.file.slice(1)}?wait=final`, { accept: '*/*' });
+  const { result } = await json(links.self.slice(1));
+  if (isNewest()) await listSinograms(result.sinogram.id);
 }
 
 /** Uploads the files of the form. */
@@ -158,8 +161,10 @@ try {
   byId('technique').replaceChildren(...METHODS.map((name) => option(name)));
   const { filter } = methods.find(({ name }) => name === 'fbp').schema.properties;
   byId('filter').replaceChildren(...(filter.enum ?? filter.oneOf.map((one) => one.const)).map((name) => option(name, name.replaceAll('_', ' '))));
-  byId('volume').replaceChildren(...volumes.map(({ name, reference }) => option(JSON.stringify(reference), name)));
-  byId('volume').value = [...byId('volume').options].find(({ textContent }) => textContent.includes('shepp'))?.value ?? byId('volume').value;
+  byId('volume').replaceChildren(
+    ...PHANTOMS.map(([name, measured]) => option(JSON.stringify(measured), name)),
+    ...volumes.map(({ name, reference }) => option(JSON.stringify({ of: reference }), `${name}, ${reference.builtin ? 'built in' : 'uploaded'}`)),
+  );
   await Promise.all([listSinograms(), reconstruct()]);
 } catch (error) {
   showProblem(error, 'Tomography');

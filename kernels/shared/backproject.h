@@ -4,6 +4,9 @@
 
 #include "shared/lanes.h"
 
+// Packets of a work-item.
+#define PACKETS (LANES == 1 ? 1 : 4)
+
 // The lanes of v by their numbers, which are taken modulo LANES where they are beyond. One instruction if clang has it.
 static inline Real permuted(Real v, Int lane) {
 #if LANES == 1
@@ -41,10 +44,21 @@ static inline Real at_bins(constant BackprojectionPass *pass, global const float
     return mad(part, as_Real(next) - as_Real(here), as_Real(here));
 }
 
-// Adds the views of a block to a packet of voxels along x. Planes that are within half a bin of the outermost rows have their values; those farther
-// away have no data.
+// Adds a packet's sum to a row of voxels of the grid.
+static inline void add_packet(constant BackprojectionPass *pass, global float *row, int x, Real sum) {
+    if (x + LANES <= pass->dims[0]) {
+        ((global UnalignedReal *)(row + x))->lanes += sum;
+        return;
+    }
+    RealLanes lanes;
+    lanes.v = sum;
+    for (int i = 0; x + i < pass->dims[0]; i++) row[x + i] += lanes.lane[i];
+}
+
+// Adds the views of a block to PACKETS packets of voxels along x, which share what a view and a row of voxels have in common. Planes that are within half
+// a bin of the outermost rows have their values; those farther away have no data.
 static inline void backproject(constant BackprojectionPass *pass, global const BackprojectionView *views, global const float *rows, global float *grid) {
-    int x = (int)get_global_id(0) * LANES, number = pass->first_row + (int)get_global_id(1);
+    int x = (int)get_global_id(0) * (LANES * PACKETS), number = pass->first_row + (int)get_global_id(1);
     if (x >= pass->dims[0] || number >= pass->end_row) return;
     int y = number % pass->dims[1], z = number / pass->dims[1], last = pass->bins[1] - 1;
     float v = mad((float)z, pass->v_step, pass->v_first);
@@ -52,25 +66,24 @@ static inline void backproject(constant BackprojectionPass *pass, global const B
     v = fmin(fmax(v, 0.0f), (float)last);
     int below = (int)v, above = min(below + 1, last);
     float part = v - (float)below;
-    Real column = to_real(x + LANE_IDS), sum = (Real)(0.0f);
+    Real column = to_real(x + LANE_IDS), sums[PACKETS];
+    for (int p = 0; p < PACKETS; p++) sums[p] = (Real)(0.0f);
     global const float *row = rows + MARGIN;
     for (int i = 0; i < pass->views; i++, row += pass->stride * pass->bins[1]) {
         float along = views[i].along_x, at_row = mad((float)y, views[i].along_y, views[i].first);
         Real u = mad(column, (Real)(along), (Real)(at_row));
         float least = mad((float)(along < 0.0f ? x + LANES - 1 : x), along, at_row);
         int is_near = LANES >= 8 && fabs(along) <= 1.0f;
-        Real value = at_bins(pass, row + below * pass->stride, u, least, is_near);
-        if (part > 0.0f) value = mad((Real)(part), at_bins(pass, row + above * pass->stride, u, least, is_near) - value, value);
-        sum += value;
+#pragma unroll
+        for (int p = 0; p < PACKETS; p++, u += along * LANES, least += along * LANES) {
+            Real value = at_bins(pass, row + below * pass->stride, u, least, is_near);
+            if (part > 0.0f) value = mad((Real)(part), at_bins(pass, row + above * pass->stride, u, least, is_near) - value, value);
+            sums[p] += value;
+        }
     }
-    global float *to = grid + ((size_t)number * pass->dims[0] + x);
-    if (x + LANES <= pass->dims[0]) {
-        ((global UnalignedReal *)to)->lanes += sum;
-        return;
-    }
-    RealLanes lanes;
-    lanes.v = sum;
-    for (int i = 0; x + i < pass->dims[0]; i++) to[i] += lanes.lane[i];
+    global float *to = grid + (size_t)number * pass->dims[0];
+    for (int p = 0; p < PACKETS; p++)
+        if (x + p * LANES < pass->dims[0]) add_packet(pass, to, x + p * LANES, sums[p]);
 }
 
 #endif

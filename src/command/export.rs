@@ -1,4 +1,4 @@
-//! `export`: makes a file of a volume or a field, here or on a server.
+//! `export` and `project`: make a file of a volume, a field or a phantom, here or on a server.
 
 use std::path::PathBuf;
 
@@ -10,15 +10,16 @@ use super::inputs::Inputs;
 use super::{Worker, read_json};
 use crate::error::{Error, Result};
 use crate::job::State;
+use crate::render::{at_projection, export_of_projection};
 
-/// What `export` is told.
+/// What `export` and `project` are told.
 #[derive(clap::Args)]
 pub(super) struct Arguments {
-    /// The request (the JSON of POST /v1/exports), or - for standard input
+    /// The request, or - for standard input
     request: PathBuf,
-    /// Where the file goes
-    #[arg(short, long, default_value = "out.csv")]
-    output: PathBuf,
+    /// Where the file goes. Default: out with the extension of its kind
+    #[arg(short, long)]
+    output: Option<PathBuf>,
     #[command(flatten)]
     inputs: Inputs,
     #[command(flatten)]
@@ -30,7 +31,19 @@ pub(super) struct Arguments {
 /// # Errors
 /// Those of the request, of its file, and of the server if one is named.
 pub(super) async fn export(args: &Arguments) -> Result<()> {
-    let request = read_json(&args.request)?;
+    make(args, read_json(&args.request)?).await
+}
+
+/// Makes a sinogram and writes it.
+///
+/// # Errors
+/// As [`export`].
+pub(super) async fn project(args: &Arguments) -> Result<()> {
+    let request = export_of_projection(&read_json(&args.request)?, &args.by.limits)?;
+    make(args, request).await.map_err(at_projection)
+}
+
+async fn make(args: &Arguments, request: Value) -> Result<()> {
     let style = ProgressStyle::with_template("{bar:30} {percent}%  {msg}  {elapsed}");
     let bar = ProgressBar::new(0).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
     let (bytes, resource) = match &args.by.server {
@@ -38,9 +51,11 @@ pub(super) async fn export(args: &Arguments) -> Result<()> {
         None => export_here(args, request, &bar).await?,
     };
     bar.finish();
-    std::fs::write(&args.output, &bytes).map_err(|e| Error::internal(format!("{}: {e}", args.output.display())))?;
+    let extension = resource["file"]["extension"].as_str().unwrap_or("bin");
+    let output = args.output.clone().unwrap_or_else(|| PathBuf::from("out").with_extension(extension));
+    std::fs::write(&output, &bytes).map_err(|e| Error::internal(format!("{}: {e}", output.display())))?;
     let ms = resource["timings"]["elapsed_ms"].as_f64().unwrap_or(0.0);
-    println!("{}: {} bytes, {ms:.0} ms, {}", args.output.display(), bytes.len(), resource["result"]);
+    println!("{}: {} bytes, {ms:.0} ms, {}", output.display(), bytes.len(), resource["result"]);
     Ok(())
 }
 

@@ -1,4 +1,4 @@
-//! The command line: `serve`, `render`, `export`, `study`, `device`, `healthcheck`, each in its own file.
+//! The command line: `serve`, `render`, `export`, `project`, `study`, `device`, `healthcheck`, each in its own file.
 
 mod client;
 mod devices;
@@ -36,6 +36,8 @@ enum Command {
     Render(Box<render::Arguments>),
     /// Turn a volume or a field into a file (the JSON of POST /v1/exports)
     Export(Box<export::Arguments>),
+    /// Measure a volume, a field or a phantom: a sinogram as NRRD (the JSON of POST /v1/projections)
+    Project(Box<export::Arguments>),
     /// Measure speed against accuracy: every technique against truths that it had no part in
     Study(Box<study::Arguments>),
     /// Show the OpenCL devices here and the one that would be used
@@ -94,7 +96,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
     let device = match &command {
         Command::Serve(config) => Some(&config.device),
         Command::Render(args) => Some(&args.by.device),
-        Command::Export(args) => Some(&args.by.device),
+        Command::Export(args) | Command::Project(args) => Some(&args.by.device),
         Command::Study(args) => Some(&args.device),
         Command::Device(args) => Some(&args.device),
         Command::Compile(device) => Some(&**device),
@@ -109,6 +111,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
             Command::Serve(config) => serve::serve(*config).await,
             Command::Render(args) => render::render(&args).await,
             Command::Export(args) => export::export(&args).await,
+            Command::Project(args) => export::project(&args).await,
             Command::Study(args) => {
                 tokio::task::spawn_blocking(move || study::study(&args)).await.map_err(Error::internal)?
             }

@@ -11,6 +11,7 @@ mod openapi;
 mod operations;
 mod plans;
 mod problem;
+mod projections;
 mod renders;
 mod routes;
 mod sinograms;

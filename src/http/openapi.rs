@@ -85,7 +85,7 @@ pub(super) async fn document(State(app): State<App>) -> Json<Value> {
         "paths": paths,
         "components": {
             "schemas": {
-                "RenderRequest": render::schema(app.service.limits()), "ExportRequest": render::export_schema(app.service.limits()), "Camera": schema_of::<CameraRequest>(),
+                "RenderRequest": render::schema(app.service.limits()), "ExportRequest": render::export_schema(app.service.limits()), "ProjectionRequest": render::projection_schema(app.service.limits()), "Camera": schema_of::<CameraRequest>(),
                 "Volume": schema_of::<VolumeInfo>(), "Sinogram": schema_of::<SinogramInfo>(), "SinogramMeta": schema_of::<SinogramMeta>(), "Problem": problem,
             },
             "responses": {"Problem": {

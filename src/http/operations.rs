@@ -166,6 +166,14 @@ pub(super) const OPERATIONS: &[Operation] = &[
     ),
     Operation {
         method: "post",
+        path: "/v1/projections",
+        words: "Measure a volume, a field or a phantom: an export that ends once its sinogram is kept; result.sinogram.id names it",
+        body: Body::Json("ProjectionRequest"),
+        answers: &[(202, JSON, "The export resource; Location names it")],
+        problems: &[400, 408, 413, 415, 422, 429, 503],
+    },
+    Operation {
+        method: "post",
         path: "/v1/sinograms",
         words: "Upload a sinogram: a form of meta (its geometry, quantity, photons_per_ray), data (NRRD, NumPy's .npy or bare numbers; u fastest, then v, then the view) and perhaps flat and dark frames; or a NRRD with the key geometry:={…}",
         body: Body::Form("SinogramMeta", &["data", "flat", "dark"]),

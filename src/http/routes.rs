@@ -14,7 +14,8 @@ use tower_http::trace::TraceLayer;
 
 use super::guard::{self, Tokens};
 use super::{
-    App, exports, frames, info, openapi, plans, problem, renders, sinograms, streams, studies, viewer, volumes,
+    App, exports, frames, info, openapi, plans, problem, projections, renders, sinograms, streams, studies, viewer,
+    volumes,
 };
 use crate::error::{Error, Result};
 
@@ -37,6 +38,7 @@ pub(super) fn router(app: App, tokens: Tokens, origins: &[String]) -> Result<Rou
         .route("/v1/exports/{id}/events", get(streams::export_events))
         .route("/v1/volumes", post(volumes::create).get(volumes::list))
         .route("/v1/volumes/{id}", get(volumes::show).delete(volumes::delete))
+        .route("/v1/projections", post(projections::create))
         .route("/v1/sinograms", post(sinograms::create).get(sinograms::list))
         .route("/v1/sinograms/{id}", get(sinograms::show).delete(sinograms::delete))
         .route("/v1/sinograms/{id}/data", get(sinograms::data))

@@ -117,7 +117,12 @@ impl Job {
             device_ms: snapshot.device_ms,
             is_final: ends,
         });
-        self.updates.send_replace(Update { state: progress.state, frame: Some(frame), work: None });
+        self.updates.send_replace(Update {
+            state: progress.state,
+            frame: Some(frame),
+            work: None,
+            is_handed_over: false,
+        });
         ends
     }
 }

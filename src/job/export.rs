@@ -27,6 +27,17 @@ impl Job {
         self.updates.send_modify(|update| update.work = Some(work));
     }
 
+    /// Hands over the file of an export that is kept as an asset before the export ends.
+    pub(crate) fn hand_over(&self, file: File) {
+        self.lock().handed = Some(file);
+        self.updates.send_modify(|update| update.is_handed_over = true);
+    }
+
+    /// The file that was handed over, once.
+    pub(crate) fn handed_over(&self) -> Option<File> {
+        self.lock().handed.take()
+    }
+
     /// Ends an export with its file.
     pub(crate) fn finish_file(&self, file: File) {
         let mut progress = self.lock();

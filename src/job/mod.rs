@@ -84,7 +84,12 @@ impl Job {
             film_wanted: AtomicBool::new(pilot),
             encoding: AtomicBool::new(false),
             progress: Mutex::new(Progress::new(task)),
-            updates: watch::Sender::new(Update { state: State::Queued, frame: None, work: None }),
+            updates: watch::Sender::new(Update {
+                state: State::Queued,
+                frame: None,
+                work: None,
+                is_handed_over: false,
+            }),
             snapshots: watch::Sender::new(None),
         })
     }

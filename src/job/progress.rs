@@ -50,6 +50,8 @@ pub(super) struct Progress {
     /// The progress of an export. `file` is its file at the end.
     pub work: Option<technique::Progress>,
     pub file: Option<Arc<File>>,
+    /// The file of an export, until it is kept.
+    pub handed: Option<File>,
 }
 
 impl Progress {
@@ -79,6 +81,7 @@ impl Progress {
             sequence: 0,
             work: None,
             file: None,
+            handed: None,
         }
     }
 }

@@ -89,6 +89,8 @@ pub struct Update {
     pub frame: Option<Arc<Frame>>,
     /// The progress of an export.
     pub work: Option<Progress>,
+    /// True once the file of an export is there to be kept.
+    pub is_handed_over: bool,
 }
 
 impl Update {

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use glam::DVec3;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::{Map, Value};
@@ -12,6 +13,7 @@ use crate::asset::Assets;
 use crate::config::Limits;
 use crate::error::{Error, Result};
 use crate::request::{self, VolumeRequest};
+use crate::scene::bounds::Bounds;
 use crate::technique::{self, Export, Kind, Subject, Technique};
 
 /// The body of `POST /v1/exports`, less the techniques' own parameters.
@@ -33,6 +35,8 @@ pub struct ExportTask {
     technique: &'static Technique,
     export: Arc<dyn Export>,
     subject: Subject,
+    /// True if its file becomes an asset.
+    is_kept: bool,
 }
 
 impl ExportTask {
@@ -51,13 +55,29 @@ impl ExportTask {
         };
         let own = request.parameters.get(technique.name).cloned().unwrap_or_else(|| Value::Object(Map::new()));
         let export = parse(&own, &format!("/{}", technique.name), assets)?;
-        let subject = subject::of_request(request.volume.as_ref(), None, assets, limits)?;
-        let task = Self { technique, export, subject };
+        if request.volume.is_some() && !export.needs_volume() {
+            return Err(Error::invalid("/volume", "what is exported is not a volume", "leave it out"));
+        }
+        // What is exported has no box that anybody sees.
+        let own = (!export.needs_volume()).then(|| Bounds::of_corners(DVec3::ZERO, DVec3::ONE));
+        let subject = subject::of_request(request.volume.as_ref(), own, assets, limits)?;
+        let task = Self { technique, export, subject, is_kept: false };
         if task.subject.field().is_none() {
             // The error is found here, and not on the device's thread.
             task.export.kernels(&task.subject)?;
         }
         Ok(task)
+    }
+
+    /// The same, with a file that becomes an asset before it is done.
+    #[must_use]
+    pub fn kept(self) -> Self {
+        Self { is_kept: true, ..self }
+    }
+
+    /// True if its file becomes an asset.
+    pub fn is_kept(&self) -> bool {
+        self.is_kept
     }
 
     /// The export technique.

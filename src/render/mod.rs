@@ -4,6 +4,7 @@
 mod budget;
 mod export;
 mod pilot;
+mod projection;
 pub(crate) mod region;
 mod schema;
 mod shared;
@@ -26,6 +27,7 @@ use crate::volume::Volume;
 pub use budget::Budget;
 pub use export::{ExportTask, export_schema};
 use pilot::Pilot;
+pub use projection::{at_projection, export_of_projection, projection_schema};
 pub use schema::{parameters_schema, schema};
 use shared::{own_parameters, where_it_was_given};
 

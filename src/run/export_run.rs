@@ -108,7 +108,11 @@ impl ExportRun {
             return Ok(Turn::Again);
         }
         let file = process.look(&mut context.device)?;
-        self.job.finish_file(file);
+        if self.task.is_kept() {
+            self.job.hand_over(file)
+        } else {
+            self.job.finish_file(file)
+        }
         Ok(Turn::Over)
     }
 }

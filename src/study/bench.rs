@@ -13,6 +13,7 @@ use crate::film::Film;
 use crate::job::Job;
 use crate::plan::Plan;
 use crate::service::Service;
+use crate::tomography::{Sinogram, SinogramParts};
 use crate::volume::RawQuery;
 
 /// The numbers of a finished render that are compared with a truth.
@@ -30,6 +31,8 @@ pub enum Reads {
     Mean,
     /// The values of the field, voxel by voxel.
     Field,
+    /// The line integrals of a projection, which is an export.
+    Sinogram,
 }
 
 /// A finished render as the study sees it.
@@ -173,6 +176,9 @@ impl Bench {
     /// # Errors
     /// As [`Bench::finish`].
     pub fn run(&self, request: &Value, reads: Reads) -> Result<Run> {
+        if reads == Reads::Sinogram {
+            return self.project(request);
+        }
         let job = self.finish(request)?;
         let reply = job.resource();
         let film = self.film(&job)?;
@@ -191,6 +197,27 @@ impl Bench {
             bytes: film.bytes() as u64 + job.field().map_or(0, |f| f.bytes()),
             stated_error: film.error().total,
             noise_is_random: !film.is_well_spread(),
+            reply,
+        })
+    }
+
+    /// Runs a projection. It has neither a seed nor a size.
+    fn project(&self, request: &Value) -> Result<Run> {
+        let own = ["technique", "volume", "project"].into_iter().map(|name| (name.to_owned(), request[name].clone()));
+        let job = self.handle.block_on(self.service.export_and_wait(own.collect()))?;
+        let file = job.file().ok_or_else(|| Error::internal("a projection without a file"))?;
+        let parts = SinogramParts { meta: None, lengths: [file.bytes.len(), 0, 0] };
+        let sinogram = Sinogram::read(&file.bytes, "study", &parts, file.bytes.len())?;
+        let reply = job.resource();
+        let number = |at: &str| reply.pointer(at).and_then(Value::as_f64).unwrap_or(0.0);
+        Ok(Run {
+            values: sinogram.values().iter().map(|p| f64::from(*p)).collect(),
+            device_ms: number("/timings/device_ms"),
+            wall_ms: number("/timings/elapsed_ms"),
+            samples: 1,
+            bytes: file.bytes.len() as u64,
+            stated_error: None,
+            noise_is_random: false,
             reply,
         })
     }
@@ -239,8 +266,8 @@ fn read(film: &Film, reply: &Value, reads: Reads) -> Vec<f64> {
             let value = |n: &&str| reply["result"]["ledger"][*n]["value"].as_f64().unwrap_or(f64::NAN);
             names.iter().map(value).collect()
         }
-        // Without a field there are no values.
-        Reads::Field => Vec::new(),
+        // Without a field there are no values, nor in a picture of a projection.
+        Reads::Field | Reads::Sinogram => Vec::new(),
         Reads::Mean => {
             let n = pixels().len().max(1) as f64;
             vec![pixels().map(luminance).sum::<f64>() / n]

@@ -32,6 +32,10 @@ pub struct OnDevice {
 
 /// An export with valid parameters.
 pub trait Export: Send + Sync {
+    /// True if its subject has a volume or a field. Without one it is of its own parameters alone.
+    fn needs_volume(&self) -> bool {
+        true
+    }
     /// The kernel variants that its process runs on a subject without a field.
     ///
     /// # Errors

@@ -1,6 +1,7 @@
 //! # `project`
 //!
-//! Projections of a volume or a field along parallel rays, as a sinogram: p(u, v, θ) = ∫ f dl, value · mm. Joseph's method (IEEE Transactions on Medical
+//! Projections along parallel rays, as a sinogram: p(u, v, θ) = ∫ f dl, value · mm. Those of a phantom are exact, shape by shape in closed form and double
+//! precision. Those of a volume or a field are by Joseph's method (IEEE Transactions on Medical
 //! Imaging 1, 1982): in each plane of voxel centres across the ray's steepest axis f is interpolated linearly, and the sum over the planes is multiplied
 //! by the ray's length between two of them. Outside the grid f is 0, within a voxel of it f falls to that. Of a smooth object the error is of second
 //! order in the voxel's side.
@@ -9,14 +10,17 @@
 //!
 //! | parameter | unit | range | default |
 //! |---|---|---|---|
-//! | `geometry` | mm, degrees | as that of an upload | what it does not say: 180 views over half a turn; bins as wide as voxels, enough to see all of the box |
-//! | `projector` | | `joseph` | `joseph` |
+//! | `phantom` | mm | `shapes`, or `name`; then there is no `volume` | the volume |
+//! | `geometry` | mm, degrees | as that of an upload | what it does not say: 180 views over half a turn; bins as wide as voxels, enough to see all of the box. Of a phantom 360 views of 256 bins of 1 mm |
+//! | `projector` | | `joseph` of volumes, `exact` of phantoms | that |
 //!
 //! The file is NRRD, which says its geometry: it may be posted to `/v1/sinograms` as it is. Voxels without a value count as 0, with a warning. Places are
 //! in single precision, which is good to 10⁻⁴ voxels of 1,000.
 //!
 //! Example: see [`example`], which a test runs.
 
+mod exact;
+mod file;
 mod process;
 
 use std::sync::Arc;
@@ -36,8 +40,9 @@ use crate::device_struct;
 use crate::error::{Error, Result};
 use crate::request;
 use crate::scene::bounds::Bounds;
-use crate::tomography::{Geometry, GeometryRequest};
+use crate::tomography::{Geometry, GeometryRequest, Phantom, PhantomRequest};
 use crate::volume::VoxelType;
+use exact::Exact;
 use process::Run;
 
 /// The technique's line in the list.
@@ -94,21 +99,23 @@ device_struct! {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Parameters {
+    /// A phantom, in place of a volume.
+    phantom: Option<PhantomRequest>,
     /// Where each bin of each view looks. What it does not say is made for the volume.
     #[serde(default)]
     geometry: GeometryRequest,
-    /// How the volume is integrated along a ray.
-    #[serde(default)]
-    projector: Projector,
+    /// How rays are integrated.
+    projector: Option<Projector>,
 }
 
-/// Ways to integrate a volume along a ray.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+/// Ways to integrate along a ray.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 enum Projector {
-    /// Interpolated linearly in planes across the ray's steepest axis.
-    #[default]
+    /// Of a volume, interpolated linearly in planes across the ray's steepest axis.
     Joseph,
+    /// Of a phantom, in closed form.
+    Exact,
 }
 
 /// A request that works as it is.
@@ -140,13 +147,21 @@ fn variant(voxel: VoxelType) -> Variant {
 /// A valid projection.
 #[derive(Debug, Clone)]
 struct Projection {
+    /// What is projected, if that is not a volume.
+    phantom: Option<Phantom>,
     asked: GeometryRequest,
 }
 
 fn parse(parameters: &Value, at: &str, _: &Assets) -> Result<Arc<dyn Export>> {
-    let Parameters { geometry: asked, projector: Projector::Joseph } = request::read(parameters, at)?;
+    let Parameters { phantom, geometry: asked, projector } = request::read(parameters, at)?;
+    let phantom = phantom.map(|phantom| phantom.resolve(&format!("{at}/phantom"))).transpose()?;
+    let possible = if phantom.is_some() { Projector::Exact } else { Projector::Joseph };
+    if projector.is_some_and(|asked| asked != possible) {
+        let permitted = "exact for a phantom, joseph for a volume";
+        return Err(Error::invalid(format!("{at}/projector"), "does not go with what is projected", permitted));
+    }
     asked.resolve(&format!("{at}/geometry"))?;
-    Ok(Arc::new(Projection { asked }))
+    Ok(Arc::new(Projection { phantom, asked }))
 }
 
 impl Projection {
@@ -180,7 +195,14 @@ fn view(bounds: &Bounds, geometry: &Geometry, view: usize) -> ProjectView {
 }
 
 impl Export for Projection {
+    fn needs_volume(&self) -> bool {
+        self.phantom.is_none()
+    }
+
     fn kernels(&self, subject: &Subject) -> Result<Vec<Variant>> {
+        if self.phantom.is_some() {
+            return Ok(Vec::new());
+        }
         let volume = subject.needed_volume()?;
         let (_, geometry) = self.geometry(subject.bounds())?;
         let seen = |corner: DVec3| (0..geometry.views()).any(|view| geometry.sees(view, corner));
@@ -193,6 +215,11 @@ impl Export for Projection {
     }
 
     fn begin(&self, device: &mut Device, seen: OnDevice) -> Result<Box<dyn Process<Look = File>>> {
+        if let Some(phantom) = &self.phantom {
+            let geometry = self.asked.resolve("/project/geometry")?;
+            let asked = self.asked.clone().of_data(geometry.views(), geometry.count());
+            return Ok(Box::new(Exact::new(phantom.clone(), asked, geometry)));
+        }
         let volume = seen.subject.needed_volume()?.clone();
         let voxels = seen.voxels.ok_or_else(|| Error::internal("a volume that is not on the device"))?;
         let bounds = seen.subject.bounds();

@@ -90,6 +90,24 @@ fn projections_are_josephs_sums_in_double_precision_on_any_grid() {
 }
 
 #[test]
+fn a_phantom_is_projected_exactly() {
+    let phantom = json!({"name": "shepp_logan", "dimensions": 3, "radius_mm": 30});
+    let said = json!({"angles_deg": [0, 33, 90], "detector": {"count": [40, 3], "spacing_mm": [2, 9]}});
+    let job = House::shared().export(
+        &json!({"technique": "project", "project": {"phantom": phantom, "geometry": said, "projector": "exact"}}),
+    );
+    let bytes = job.file().unwrap().bytes.to_vec();
+    let sinogram =
+        Sinogram::read(&bytes, "test", &SinogramParts { meta: None, lengths: [bytes.len(), 0, 0] }, 1 << 20).unwrap();
+    let (phantom, geometry) = (crate::tomography::phantom(&phantom), geometry(&said));
+    for (i, found) in sinogram.values().iter().enumerate() {
+        let truth = phantom.integral(&geometry.ray(i / 120, [i % 40, i / 40 % 3]));
+        assert_eq!(*found, truth as f32, "{i}");
+    }
+    assert_eq!((sinogram.geometry(), &job.resource()["result"]["projector"]), (&geometry, &json!("exact")));
+}
+
+#[test]
 fn every_number_of_lanes_projects_the_same() {
     let own =
         json!({"geometry": {"angles_deg": {"count": 20}, "detector": {"count": [45, 5], "spacing_mm": [0.06, 0.5]}}});
@@ -171,6 +189,7 @@ fn wrong_projections_are_refused_at_their_field() {
         (json!({"geometry": {"angles_deg": {"count": 0}}}), "/project/geometry/angles_deg"),
         (json!({"geometry": {"type": "spiral"}}), "/project/geometry/type"),
         (json!({"projector": "siddon"}), "/project/projector"),
+        (json!({"projector": "exact"}), "/project/projector"),
         (json!({"views": 3}), "/project/views"),
     ] {
         match parsed(&of(own.clone())) {
@@ -178,6 +197,21 @@ fn wrong_projections_are_refused_at_their_field() {
                 assert!(violations.iter().any(|v| v.pointer.starts_with(at)), "{own}: {violations:?}")
             }
             other => panic!("{own}: {other:?}"),
+        }
+    }
+    let head = json!({"name": "shepp_logan"});
+    for (request, at) in [
+        (json!({"technique": "project", "project": {"phantom": head, "projector": "joseph"}}), "/project/projector"),
+        (json!({"technique": "project", "project": {"phantom": {}}}), "/project/phantom"),
+        (
+            json!({"technique": "project", "project": {"phantom": {"name": "shepp_logan", "greys": "pink"}}}),
+            "/project/phantom/greys",
+        ),
+        (json!({"technique": "project", "volume": {"builtin": "sphere"}, "project": {"phantom": head}}), "/volume"),
+    ] {
+        match parsed(&request) {
+            Err(Error::Invalid(violations)) => assert_eq!(violations[0].pointer, at, "{request}"),
+            other => panic!("{request}: {other:?}"),
         }
     }
     let large = of(json!({"geometry": {"angles_deg": {"count": 60_000}, "detector": {"count": [8000, 8000]}}}));

@@ -241,7 +241,7 @@ async fn the_tomography_page_projects_and_reconstructs() {
     let page = Page::open(DESKTOP).await;
     page.settled().await;
     page.find("header a[href='tomography.html']").await.click().await.expect("the link to tomography");
-    page.until("the volumes", "document.querySelectorAll('#volume option').length > 5").await;
+    page.until("the volumes", "document.querySelectorAll('#volume option').length > 7").await;
     page.js("document.querySelector('#measured-views').value = 40").await;
     page.find("#measure button").await.click().await.expect("the button");
     page.until("a sinogram", "document.querySelector('#preview').naturalHeight === 40").await;

@@ -8,6 +8,7 @@ mod ellipsoid;
 mod fbp;
 mod half_space;
 mod isosurface;
+mod project;
 pub mod scattering;
 mod slab;
 
@@ -29,4 +30,5 @@ pub const CASES: &[Case] = &[
     ellipsoid::MEAN,
     ellipsoid::XRAY,
     fbp::CASE,
+    project::CASE,
 ];

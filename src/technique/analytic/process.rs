@@ -47,6 +47,11 @@ struct Block {
     next_row: usize,
 }
 
+/// Voxels along x of a work-item: `LANES` times `PACKETS` of `kernels/shared/backproject.h`.
+fn voxels_of_item(lanes: usize) -> usize {
+    if lanes == 1 { 1 } else { 4 * lanes }
+}
+
 impl Run {
     pub fn new(device: &Device, of: Arc<Reconstruction>) -> Result<Self> {
         let zeros = vec![0; size_of::<f32>() * of.computed().iter().product::<usize>()];
@@ -120,7 +125,8 @@ impl Run {
         };
         device.write(&mut self.pass_buffer, 0, bytemuck::bytes_of(&pass))?;
         let arguments = [("pass", &self.pass_buffer), ("views", views), ("rows", rows), ("grid", &self.grid)];
-        let took = device.run(&self.of.variant(), &arguments, [wide.div_ceil(device.info().lanes as usize), some])?;
+        let across = wide.div_ceil(voxels_of_item(device.info().lanes as usize));
+        let took = device.run(&self.of.variant(), &arguments, [across, some])?;
         self.slice_length.learn(some, work, took);
         self.block.next_row = end;
         if end == high * deep {

@@ -3,9 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use serde_json::{Value, json};
-
-use super::{ProjectPass, ProjectView, variant};
+use super::{ProjectPass, ProjectView, file, variant};
 use crate::device::{Buffer, Device, SliceLength};
 use crate::error::Result;
 use crate::technique::{File, Process, Progress, Step};
@@ -85,23 +83,6 @@ impl Run {
         self.next_row += some;
         Ok(took)
     }
-
-    fn result(&self, sinogram: &Sinogram) -> Value {
-        let info = sinogram.info("", true);
-        let mut warnings: Vec<Value> = info.warnings.iter().map(|words| warning("data_check", words.clone())).collect();
-        let without = self.volume.non_finite();
-        if without > 0 {
-            warnings.push(warning("no_value", format!("{without} voxels have no value and count as 0")));
-        }
-        let unit = if self.volume.unit() == "mm" { "value · mm" } else { "value · unit" };
-        let device_ms = 1e3 * self.device_time.as_secs_f64();
-        json!({"geometry": info.geometry, "views": info.views, "bins": info.bins, "range": info.range, "quantity": info.quantity,
-            "projector": "joseph", "unit": unit, "device_ms": device_ms, "data_check": info.data_check, "warnings": warnings})
-    }
-}
-
-fn warning(code: &str, message: String) -> Value {
-    json!({"code": code, "message": message})
 }
 
 impl Process for Run {
@@ -126,7 +107,10 @@ impl Process for Run {
         let mut values = vec![0.0f32; self.rows() * self.geometry.count()[0]];
         device.read(&self.sinogram, 0, &mut values)?;
         let sinogram = Sinogram::computed(self.asked.clone(), self.geometry.clone(), values, self.volume.name());
-        let result = self.result(&sinogram);
-        Ok(File { bytes: sinogram.nrrd()?.into(), media_type: "application/octet-stream", extension: "nrrd", result })
+        let unit = if self.volume.unit() == "mm" { "value · mm" } else { "value · unit" };
+        let without = self.volume.non_finite();
+        let warning =
+            (without > 0).then(|| file::warning("no_value", format!("{without} voxels have no value and count as 0")));
+        file::of(&sinogram, "joseph", unit, self.device_time, warning.into_iter().collect())
     }
 }

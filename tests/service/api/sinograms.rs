@@ -128,6 +128,49 @@ async fn wrong_forms_are_refused_at_their_part() {
 }
 
 #[tokio::test]
+async fn a_measurement_is_kept_and_reconstructed() {
+    let server = shared();
+    let api = Api::new(&server);
+    let geometry = json!({"angles_deg": {"count": 50}, "detector": {"count": [64, 1], "spacing_mm": [0.7, 1]}});
+    let disc = json!({"phantom": {"shapes": [{"type": "ellipse", "value": 0.03, "axes_mm": [12, 12]}]}});
+    for (body, views) in [
+        (json!({"of": disc, "geometry": geometry}), 50),
+        (
+            json!({"of": {"builtin": "gaussian", "resolution": 16}, "geometry": {"angles_deg": {"count": 30}}, "projector": "joseph"}),
+            30,
+        ),
+    ] {
+        let response = api.post_to("/v1/projections", &body).await;
+        assert_eq!(response.status(), 202, "{body}");
+        let location = response.headers()["location"].to_str().unwrap().to_owned();
+        let done = api.until_state(&location, "done").await;
+        let id = done["result"]["sinogram"]["id"].as_str().unwrap().to_owned();
+        let kept = api.get_json(&format!("/v1/sinograms/{id}")).await;
+        assert_eq!((&kept["views"], &kept["bins"]), (&json!(views), &done["result"]["bins"]), "{kept}");
+        // The same measurement is the same sinogram.
+        let again = api.post_to("/v1/projections", &body).await.headers()["location"].to_str().unwrap().to_owned();
+        assert_eq!(api.until_state(&again, "done").await["result"]["sinogram"]["id"], json!(id));
+        let render = json!({"technique": "slice", "volume": {"fbp": {"sinogram": {"id": id}}}, "image": {"width": 32, "height": 32}, "budget": {"samples": 1}});
+        assert_eq!(api.finish(&render).await["result"]["views"], json!(views));
+    }
+    for (body, at) in [
+        (json!({"of": {"phantom": {"name": "shepp_logan", "radius_mm": 0}}}), "/of/phantom/radius_mm"),
+        (json!({"of": {"builtin": "teapot"}}), "/of/builtin"),
+        (json!({"of": {"id": "none"}}), "/of/id"),
+        (json!({"of": {"builtin": "sphere", "phantom": {"name": "shepp_logan"}}}), "/of"),
+        (json!({"of": disc, "projector": "joseph"}), "/projector"),
+        (json!({"of": disc, "geometry": {"detector": {"count": [0, 1]}}}), "/geometry/detector/count/0"),
+        (json!({"views": 3}), "/views"),
+    ] {
+        names(
+            &problem(api.post_to("/v1/projections", &body).await, 422, &body.to_string()).await,
+            at,
+            &body.to_string(),
+        );
+    }
+}
+
+#[tokio::test]
 async fn the_command_line_reconstructs_a_sinogram() {
     let server = shared();
     let folder = tempfile::tempdir().unwrap();
@@ -149,4 +192,15 @@ async fn the_command_line_reconstructs_a_sinogram() {
     let nrrd = ["render", &path("blurred.json"), "--sinogram", &path("test.nrrd"), "-o", &path("blurred.png")];
     succeeds(&cloudchamber(folder.path(), &nrrd));
     fails(&cloudchamber(folder.path(), &["render", &path("scene.json"), "--sinogram", &path("disc.npy")]), "/meta");
+    // What `project` makes is taken back.
+    let disc = json!({"of": {"phantom": {"shapes": [{"type": "ellipse", "axes_mm": [9, 9]}]}}, "geometry": {"angles_deg": {"count": 20}, "detector": {"count": [30, 1]}}});
+    std::fs::write(path("disc.json"), disc.to_string()).unwrap();
+    succeeds(&cloudchamber(folder.path(), &["project", &path("disc.json"), "-o", &path("here.nrrd")]));
+    let there = ["project", &path("disc.json"), "-o", &path("there.nrrd"), "--server", &server.url()];
+    succeeds(&cloudchamber(folder.path(), &there));
+    assert_eq!(std::fs::read(path("here.nrrd")).unwrap(), std::fs::read(path("there.nrrd")).unwrap());
+    let nrrd = ["render", &path("scene.json"), "--sinogram", &path("here.nrrd"), "-o", &path("again.png")];
+    succeeds(&cloudchamber(folder.path(), &nrrd));
+    std::fs::write(path("wrong.json"), json!({"of": {"builtin": "teapot"}}).to_string()).unwrap();
+    fails(&cloudchamber(folder.path(), &["project", &path("wrong.json")]), "/of/builtin");
 }
