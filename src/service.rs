@@ -179,7 +179,10 @@ async fn keep(service: Service, job: Arc<Job>) {
     let ended = updates.wait_for(|update| update.is_handed_over || update.state.is_terminal()).await.map(drop);
     let Some(mut file) = ended.ok().and_then(|()| job.handed_over()) else { return };
     let bytes = file.bytes.to_vec();
-    let stored = tokio::task::spawn_blocking(move || service.assets().sinograms().insert(bytes, "projection", None));
+    let named =
+        ["/project/phantom/name", "/volume/builtin"].into_iter().find_map(|at| job.request().pointer(at)?.as_str());
+    let name = named.unwrap_or("projection").to_owned();
+    let stored = tokio::task::spawn_blocking(move || service.assets().sinograms().insert(bytes, &name, None));
     match stored.await.map_err(Error::internal).and_then(|stored| stored) {
         Ok((_, id, _)) => {
             file.result["sinogram"] = json!({"id": id});

@@ -98,7 +98,7 @@ async function reconstruct() {
     const { result, timings } = await json(links.self.slice(1));
     if (!isNewest()) return;
     byId('facts').textContent = `${result.views} views, ${short(result.device_ms)} ms on the device, ${short(timings.elapsed_ms)} ms in all`;
-    byId('warnings').replaceChildren(...result.warnings.map(({ message }) => make('li', { textContent: message })));
+    byId('expect').replaceChildren(...result.warnings.map(({ message }) => make('li', { textContent: message })));
   });
 }
 

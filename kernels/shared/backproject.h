@@ -29,7 +29,8 @@ static inline Real permuted(Real v, Int lane) {
 static inline Real at_bins(constant BackprojectionPass *pass, global const float *row, Real u, float least, int is_near) {
     Real part;
     if (is_near) {
-        int first = clamp((int)floor(least), 1 - MARGIN, pass->bins[0]);
+        // The floor: PoCL's own for a scalar takes branches.
+        int whole = (int)least, first = clamp(whole - (least < (float)whole), 1 - MARGIN, pass->bins[0]);
         Real place = u - (float)first;
         // By rounding, the last place may be LANES.
         Int lane = min(to_int(place), (Int)(LANES - 1));
