@@ -175,19 +175,24 @@ impl Service {
 
 /// Waits for the file of a projection, and ends the export once that is a sinogram of the store.
 async fn keep(service: Service, job: Arc<Job>) {
+    let asked = job.clone();
     let mut updates = job.watch();
     let ended = updates.wait_for(|update| update.is_handed_over || update.state.is_terminal()).await.map(drop);
     let Some(mut file) = ended.ok().and_then(|()| job.handed_over()) else { return };
+    if job.state().is_terminal() {
+        return;
+    }
     let bytes = file.bytes.to_vec();
-    let named =
-        ["/project/phantom/name", "/volume/builtin"].into_iter().find_map(|at| job.request().pointer(at)?.as_str());
-    let name = named.unwrap_or("projection").to_owned();
-    let stored = tokio::task::spawn_blocking(move || service.assets().sinograms().insert(bytes, &name, None));
-    match stored.await.map_err(Error::internal).and_then(|stored| stored) {
-        Ok((_, id, _)) => {
-            file.result["sinogram"] = json!({"id": id});
-            job.finish_file(file);
-        }
-        Err(error) => drop(job.fail(&error)),
+    let named = ["/project/phantom/name", "/volume/builtin"];
+    let name = named.into_iter().find_map(|at| job.request().pointer(at)?.as_str()).unwrap_or("projection").to_owned();
+    let stored = tokio::task::spawn_blocking(move || {
+        let sinograms = service.assets().sinograms();
+        let (_, id, is_new) = sinograms.insert(bytes, &name, None)?;
+        file.result["sinogram"] = json!({"id": id});
+        // A cancelled measurement leaves nothing behind.
+        if !job.finish_file(file) && is_new { sinograms.delete(&id) } else { Ok(()) }
+    });
+    if let Err(error) = stored.await.map_err(Error::internal).and_then(|stored| stored) {
+        asked.fail(&error);
     }
 }

@@ -68,8 +68,10 @@ async function showPreview() {
   await busy(byId('preview'), 'The sinogram', (isNewest) => showImage(byId('preview'), path, isNewest, what));
 }
 
-async function chooseSinogram() {
-  shown = await json(`v1/sinograms/${byId('sinogram').value}`);
+async function chooseSinogram(isNewest = () => true) {
+  const chosen = await json(`v1/sinograms/${byId('sinogram').value}`);
+  if (!isNewest()) return;
+  shown = chosen;
   Object.assign(byId('view'), { max: shown.views - 1, value: -1, disabled: shown.bins[1] === 1 });
   Object.assign(byId('numbers'), { href: `v1/sinograms/${shown.id}/data`, hidden: false });
   showCheck();

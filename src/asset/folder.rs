@@ -121,9 +121,15 @@ impl Folder {
     /// Writes an upload: the body first, then the record that makes it count.
     pub fn write<A: Asset>(&self, id: &str, bytes: &[u8], record: &Record<A>) -> Result<()> {
         let text = serde_json::to_vec_pretty(record).map_err(Error::internal)?;
-        self.write_file(&self.body_path(id, record), id, bytes)
-            .and_then(|()| self.write_file(&self.0.join(format!("{id}.json")), id, &text))
-            .map_err(|cause| failed("store an upload", &cause))
+        let body = self.body_path(id, record);
+        let written = self
+            .write_file(&body, id, bytes)
+            .and_then(|()| self.write_file(&self.0.join(format!("{id}.json")), id, &text));
+        if written.is_err() {
+            // A body without a record takes room for nothing.
+            let _ = fs::remove_file(&body);
+        }
+        written.map_err(|cause| failed("store an upload", &cause))
     }
 
     fn write_file(&self, path: &Path, id: &str, bytes: &[u8]) -> io::Result<()> {

@@ -14,7 +14,7 @@ use super::App;
 use super::accept::negotiate;
 use super::form::{self, Part};
 use super::problem::{self, Id};
-use super::volumes::file_name;
+use super::volumes::{clean_name, file_name};
 use crate::error::{Error, Result};
 use crate::frame;
 use crate::request::{self, schema_of};
@@ -40,7 +40,10 @@ pub(super) async fn create(State(app): State<App>, request: Request<Body>) -> Re
     let limit = app.service.limits().max_body_bytes;
     let bytes = problem::read_body(&head.headers, body, limit, app.request_timeout).await?;
     let (bytes, name, how) = match boundary {
-        Some(boundary) => of_form(form::parts(bytes, boundary, &PARTS).await?, name)?,
+        Some(boundary) => {
+            let most = app.service.limits().max_json_bytes;
+            of_form(form::parts(bytes, boundary, &PARTS).await?, name, most)?
+        }
         None => (bytes, name, None),
     };
     if bytes.is_empty() {
@@ -61,13 +64,20 @@ pub(super) async fn create(State(app): State<App>, request: Request<Body>) -> Re
     Ok((status, [(header::LOCATION, location)], Json(info)).into_response())
 }
 
-/// The bytes of a form's files, the name, and what is said of them.
-fn of_form(parts: HashMap<String, Part>, name: String) -> Result<(Vec<u8>, String, Option<SinogramParts>)> {
+/// The bytes of a form's files, the name, and what is said of them in at most `most` bytes of JSON.
+fn of_form(
+    parts: HashMap<String, Part>,
+    name: String,
+    most: usize,
+) -> Result<(Vec<u8>, String, Option<SinogramParts>)> {
     let bytes_of = |part: &str| parts.get(part).map_or(&[][..], |part| &part.bytes);
     let Some(data) = parts.get("data") else {
         return Err(Error::invalid("/data", "is missing", "a file: NRRD, NumPy's .npy, or bare numbers"));
     };
     let meta = match parts.get("meta") {
+        Some(meta) if meta.bytes.len() > most => {
+            return Err(Error::TooLarge { what: "the part meta".into(), limit: format!("{most} bytes") });
+        }
         Some(meta) => {
             let value: Value = serde_json::from_slice(&meta.bytes)
                 .map_err(|cause| Error::invalid("/meta", format!("is not JSON: {cause}"), "an object"))?;
@@ -76,7 +86,7 @@ fn of_form(parts: HashMap<String, Part>, name: String) -> Result<(Vec<u8>, Strin
         None => None,
     };
     let (bytes, how) = SinogramParts::join(meta, ["data", "flat", "dark"].map(bytes_of));
-    let name = data.file_name.clone().filter(|_| name == "sinogram").unwrap_or(name);
+    let name = data.file_name.as_deref().filter(|_| name == "sinogram").map_or(name, clean_name);
     Ok((bytes, name, Some(how)))
 }
 
@@ -96,7 +106,7 @@ pub(super) async fn data(State(app): State<App>, Id(id): Id, headers: HeaderMap)
     let media = negotiate(&headers, &[NRRD, NPY])?;
     let made = tokio::task::spawn_blocking(move || -> Result<(Vec<u8>, String)> {
         let sinogram = app.service.assets().sinograms().get(&id)?;
-        let (bytes, extension) = if media == NPY { (sinogram.npy()?, "npy") } else { (sinogram.nrrd()?, "nrrd") };
+        let (bytes, extension) = if media == NPY { (sinogram.npy(), "npy") } else { (sinogram.nrrd()?, "nrrd") };
         Ok((bytes, format!("attachment; filename=\"{id}.{extension}\"")))
     });
     let (bytes, disposition) = made.await.map_err(Error::internal)??;

@@ -40,7 +40,12 @@ pub(super) async fn create(State(app): State<App>, request: Request<Body>) -> Re
 /// The name of an upload, or `otherwise`.
 pub(super) fn file_name(headers: &HeaderMap, otherwise: &str) -> String {
     let name = headers.get("x-filename").and_then(|v| v.to_str().ok()).unwrap_or(otherwise);
-    percent_decode_str(name).decode_utf8_lossy().chars().filter(|c| !c.is_control()).take(200).collect()
+    clean_name(&percent_decode_str(name).decode_utf8_lossy())
+}
+
+/// A name without control characters, of bearable length.
+pub(super) fn clean_name(name: &str) -> String {
+    name.chars().filter(|c| !c.is_control()).take(200).collect()
 }
 
 /// Refuses the body of a form by its type, since complaints about its bytes would not help.

@@ -29,7 +29,11 @@ impl Job {
 
     /// Hands over the file of an export that is kept as an asset before the export ends.
     pub(crate) fn hand_over(&self, file: File) {
-        self.lock().handed = Some(file);
+        let mut progress = self.lock();
+        if progress.state.is_terminal() {
+            return;
+        }
+        progress.handed = Some(file);
         self.updates.send_modify(|update| update.is_handed_over = true);
     }
 
@@ -38,11 +42,11 @@ impl Job {
         self.lock().handed.take()
     }
 
-    /// Ends an export with its file.
-    pub(crate) fn finish_file(&self, file: File) {
+    /// Ends an export with its file. False if it has ended already.
+    pub(crate) fn finish_file(&self, file: File) -> bool {
         let mut progress = self.lock();
         if progress.state.is_terminal() {
-            return;
+            return false;
         }
         let warnings = file.result["warnings"].as_array();
         progress.warnings.extend(warnings.into_iter().flatten().cloned());
@@ -52,6 +56,7 @@ impl Job {
         progress.in_engine = false;
         progress.timings.elapsed_ms = progress.asked.elapsed().as_secs_f64() * 1e3;
         self.updates.send_modify(|update| update.state = State::Done);
+        true
     }
 
     /// The file of a finished export.

@@ -62,6 +62,7 @@ impl ExportTask {
         let own = (!export.needs_volume()).then(|| Bounds::of_corners(DVec3::ZERO, DVec3::ONE));
         let subject = subject::of_request(request.volume.as_ref(), own, assets, limits)?;
         let task = Self { technique, export, subject, is_kept: false };
+        task.export.check(task.subject.bounds())?;
         if task.subject.field().is_none() {
             // The error is found here, and not on the device's thread.
             task.export.kernels(&task.subject)?;

@@ -109,9 +109,10 @@ impl ExportRun {
         }
         let file = process.look(&mut context.device)?;
         if self.task.is_kept() {
-            self.job.hand_over(file)
+            self.job.hand_over(file);
         } else {
-            self.job.finish_file(file)
+            // A cancelled export has no file.
+            let _ = self.job.finish_file(file);
         }
         Ok(Turn::Over)
     }

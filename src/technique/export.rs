@@ -8,6 +8,7 @@ use super::{Process, Subject};
 use crate::device::program::Variant;
 use crate::device::{Buffer, Device};
 use crate::error::Result;
+use crate::scene::bounds::Bounds;
 
 /// The file that an export makes.
 #[derive(Debug, Clone)]
@@ -35,6 +36,13 @@ pub trait Export: Send + Sync {
     /// True if its subject has a volume or a field. Without one it is of its own parameters alone.
     fn needs_volume(&self) -> bool {
         true
+    }
+    /// Checks its parameters against the box of its subject, before a field is computed.
+    ///
+    /// # Errors
+    /// `Error::Invalid` if they do not go together; `Error::TooLarge`.
+    fn check(&self, _: &Bounds) -> Result<()> {
+        Ok(())
     }
     /// The kernel variants that its process runs on a subject without a field.
     ///

@@ -150,9 +150,11 @@ struct Projection {
     /// What is projected, if that is not a volume.
     phantom: Option<Phantom>,
     asked: GeometryRequest,
+    /// The most bytes of a sinogram, which are those of a volume.
+    most_bytes: u64,
 }
 
-fn parse(parameters: &Value, at: &str, _: &Assets) -> Result<Arc<dyn Export>> {
+fn parse(parameters: &Value, at: &str, assets: &Assets) -> Result<Arc<dyn Export>> {
     let Parameters { phantom, geometry: asked, projector } = request::read(parameters, at)?;
     let phantom = phantom.map(|phantom| phantom.resolve(&format!("{at}/phantom"))).transpose()?;
     let possible = if phantom.is_some() { Projector::Exact } else { Projector::Joseph };
@@ -160,8 +162,11 @@ fn parse(parameters: &Value, at: &str, _: &Assets) -> Result<Arc<dyn Export>> {
         let permitted = "exact for a phantom, joseph for a volume";
         return Err(Error::invalid(format!("{at}/projector"), "does not go with what is projected", permitted));
     }
-    asked.resolve(&format!("{at}/geometry"))?;
-    Ok(Arc::new(Projection { phantom, asked }))
+    let most_bytes = assets.limits().volume.max_volume_bytes;
+    let made = Projection { phantom, asked, most_bytes };
+    let said = if made.phantom.is_some() { made.asked.clone() } else { made.asked.clone().of_data(VIEWS, [1; 2]) };
+    made.checked(said.resolve(&format!("{at}/geometry"))?)?;
+    Ok(Arc::new(made))
 }
 
 impl Projection {
@@ -171,8 +176,18 @@ impl Projection {
         let half = |along: fn(DVec3) -> f64| bounds.corners().into_iter().map(along).fold(0.0, f64::max);
         let size = [half(|p| p.truncate().length()), half(|p| p.z.abs())].map(|half| 2.0 * half);
         let asked = self.asked.clone().seeing(size, bounds.smallest_side(), VIEWS);
-        let geometry = asked.resolve("/project/geometry")?;
+        let geometry = self.checked(asked.resolve("/project/geometry")?)?;
         Ok((asked, geometry))
+    }
+
+    /// The geometry, if its sinogram is not too large.
+    fn checked(&self, geometry: Geometry) -> Result<Geometry> {
+        let bytes = (size_of::<f32>() * geometry.count().iter().product::<usize>() * geometry.views()) as u64;
+        if bytes > self.most_bytes {
+            let limit = format!("{} bytes", self.most_bytes);
+            return Err(Error::TooLarge { what: format!("a sinogram of {bytes} bytes"), limit });
+        }
+        Ok(geometry)
     }
 }
 
@@ -199,19 +214,21 @@ impl Export for Projection {
         self.phantom.is_none()
     }
 
-    fn kernels(&self, subject: &Subject) -> Result<Vec<Variant>> {
+    fn check(&self, bounds: &Bounds) -> Result<()> {
         if self.phantom.is_some() {
-            return Ok(Vec::new());
+            return Ok(());
         }
-        let volume = subject.needed_volume()?;
-        let (_, geometry) = self.geometry(subject.bounds())?;
-        let seen = |corner: DVec3| (0..geometry.views()).any(|view| geometry.sees(view, corner));
-        // The centre is seen if the box is wider than the detector.
-        if !subject.bounds().corners().into_iter().chain([DVec3::ZERO]).any(seen) {
-            let permitted = "a detector that some of the volume's corners, or its centre, are projected to";
-            return Err(Error::invalid("/project/geometry", "no ray of it meets the volume", permitted));
+        let (_, geometry) = self.geometry(bounds)?;
+        let corners = bounds.corners();
+        if (0..geometry.views()).any(|view| geometry.sees(view, &corners)) {
+            return Ok(());
         }
-        Ok(vec![variant(volume.voxel_type())])
+        let permitted = "a detector that a part of the volume is projected to";
+        Err(Error::invalid("/project/geometry", "no ray of it meets the volume", permitted))
+    }
+
+    fn kernels(&self, subject: &Subject) -> Result<Vec<Variant>> {
+        Ok(if self.phantom.is_some() { Vec::new() } else { vec![variant(subject.needed_volume()?.voxel_type())] })
     }
 
     fn begin(&self, device: &mut Device, seen: OnDevice) -> Result<Box<dyn Process<Look = File>>> {

@@ -33,21 +33,16 @@ impl Sinogram {
         Ok([(header + "\n").as_bytes(), bytemuck::cast_slice(values)].concat())
     }
 
-    /// NumPy's format, of the shape (views, v, u).
-    ///
-    /// # Errors
-    /// [`Error::Internal`] if it cannot be written.
-    pub fn npy(&self) -> Result<Vec<u8>> {
-        use npyz::WriterBuilder;
+    /// NumPy's format of version 1.0, of the shape (views, v, u).
+    pub fn npy(&self) -> Vec<u8> {
         let (values, _) = self.handed_out();
         let ([u, v], views) = (self.geometry().count(), self.geometry().views());
-        let mut bytes = Vec::new();
-        let shape = [views, v, u].map(|n| n as u64);
-        let options = npyz::WriteOptions::<f32>::new().default_dtype().shape(&shape);
-        let mut writer = options.writer(&mut bytes).begin_nd().map_err(Error::internal)?;
-        writer.extend(values.iter().copied()).map_err(Error::internal)?;
-        writer.finish().map_err(Error::internal)?;
-        Ok(bytes)
+        let mut header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({views}, {v}, {u}), }}");
+        // Magic, version, length and header take a multiple of 64 bytes.
+        header += &" ".repeat(63 - (10 + header.len()) % 64);
+        header.push('\n');
+        let length = (header.len() as u16).to_le_bytes();
+        [b"\x93NUMPY\x01\x00", &length[..], header.as_bytes(), bytemuck::cast_slice(values)].concat()
     }
 
     /// The line integrals of a view: u to the right, v upwards. Without a view, those of the middle row of all views: u to the right, views downwards.

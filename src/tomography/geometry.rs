@@ -66,11 +66,15 @@ impl Geometry {
         [DVec3::new(du * cos, du * sin, 0.0), DVec3::new(0.0, 0.0, dv)]
     }
 
-    /// True if a point, mm, is projected to the detector in a view: to one of its bins, or within half a bin of them.
-    pub fn sees(&self, view: usize, point: DVec3) -> bool {
+    /// True if the detector sees a part of the body between some points, mm, in a view: if the points' places on it reach its bins on both sides.
+    pub fn sees(&self, view: usize, points: &[DVec3]) -> bool {
         let (sin, cos) = self.angles[view].sin_cos();
-        let places = [point.x * cos + point.y * sin, point.z];
-        (0..2).all(|side| (-0.5..=self.count[side] as f64 - 0.5).contains(&self.bin(side, places[side])))
+        (0..2).all(|side| {
+            let place = |p: &DVec3| self.bin(side, if side == 0 { p.x * cos + p.y * sin } else { p.z });
+            let low = points.iter().map(place).fold(f64::INFINITY, f64::min);
+            let high = points.iter().map(place).fold(f64::NEG_INFINITY, f64::max);
+            low <= self.count[side] as f64 - 0.5 && high >= -0.5
+        })
     }
 
     /// The weights Δθ of the views in an integral over half a turn, and the widest gap that no view covers, radians.

@@ -106,7 +106,8 @@ impl GeometryRequest {
     #[must_use]
     pub fn seeing(mut self, size_mm: [f64; 2], side_mm: f64, views: usize) -> Self {
         let spacing = *self.detector.spacing_mm.get_or_insert([side_mm; 2]);
-        let bins = |side: usize| ((size_mm[side] / spacing[side]).ceil() as usize).max(1);
+        let size = |side: usize| size_mm[side] + 2.0 * self.detector.offset_mm[side].abs();
+        let bins = |side: usize| ((size(side) / spacing[side]).ceil() as usize).max(1);
         let bins = self.detector.count.unwrap_or([bins(0), bins(1)]);
         self.of_data(views, bins)
     }

@@ -50,14 +50,16 @@ impl OpenBeam {
     /// The line integrals of readings, view by view. `are_counts` if they are photons.
     pub fn line_integrals(&self, readings: &[f32], are_counts: bool) -> LineIntegrals {
         let bins = self.span.len();
-        let transmission = |i: usize| (readings[i] - self.dark[i % bins]) / self.span[i % bins];
+        // In double precision no quotient of floats is infinite, so that all logarithms are finite.
+        let transmission =
+            |i: usize| (f64::from(readings[i]) - f64::from(self.dark[i % bins])) / f64::from(self.span[i % bins]);
         let lost = (0..readings.len()).into_par_iter().filter(|i| transmission(*i) <= 0.0).count();
         let least = (0..readings.len()).into_par_iter().map(transmission).filter(|t| *t > 0.0);
-        let least = if lost > 0 { least.min_by(f32::total_cmp).unwrap_or(1.0) } else { 1.0 };
-        let floor = |i: usize| if are_counts { 0.5 / self.span[i % bins] } else { 0.5 * least };
+        let least = if lost > 0 { least.min_by(f64::total_cmp).unwrap_or(1.0) } else { 1.0 };
+        let floor = |i: usize| if are_counts { 0.5 / f64::from(self.span[i % bins]) } else { 0.5 * least };
         let value = |i: usize| {
             let t = transmission(i);
-            -f64::from(if t > 0.0 { t } else { floor(i) }).ln() as f32
+            -(if t > 0.0 { t } else { floor(i) }).ln() as f32
         };
         let values = (0..readings.len()).into_par_iter().map(value).collect();
         let taken = if are_counts { "half a photon" } else { "half of the least transmission" };
@@ -88,6 +90,8 @@ mod tests {
         assert!((f64::from(found.values[0]) - 2f64.ln()).abs() < 1e-6);
         assert!((f64::from(found.values[1]) - 2000f64.ln()).abs() < 1e-6);
         assert!(counts.line_integrals(&[1.0], true).note.is_none());
+        let faint = OpenBeam::new(1, Some(vec![1e-40]), None, None).expect("a beam");
+        assert!(faint.line_integrals(&[3e38], false).values[0].is_finite());
     }
 
     #[test]

@@ -175,6 +175,23 @@ fn without_a_geometry_all_of_the_box_is_seen() {
     assert_eq!(result["warnings"], json!([]), "nothing is cut off");
 }
 
+/// A detector may see any part of the box, whether or not a corner or the centre falls on it.
+#[test]
+fn a_detector_between_the_corners_sees_the_volume() {
+    let said = json!({"angles_deg": [0, 90], "detector": {"count": [96, 1], "spacing_mm": [0.03, 0.03], "offset_mm": [0, 0.3]}});
+    let (sinogram, _) =
+        projected(House::shared(), &json!({"builtin": "sphere", "resolution": 32}), &json!({"geometry": said}));
+    assert!(sinogram.values().iter().any(|p| *p > 0.1));
+    // Where the detector is moved and its bins are not said, all of the box is seen all the same.
+    let aside = json!({"geometry": {"angles_deg": [0, 60], "detector": {"offset_mm": [0.9, 0]}}});
+    let (_, result) = projected(House::shared(), &json!({"builtin": "sphere", "resolution": 16}), &aside);
+    assert!(result["data_check"]["at_edges"].as_f64().unwrap() < 0.01, "{result}");
+    // What is not said of a large detector are 180 views, not 360.
+    let large = json!({"technique": "project", "volume": {"builtin": "sphere", "resolution": 8}, "project": {"geometry": {"detector": {"count": [1024, 1024]}}}});
+    let house = House::shared();
+    assert!(cloudchamber::render::ExportTask::from_json(&large, house.assets(), house.service.limits()).is_ok());
+}
+
 #[test]
 fn wrong_projections_are_refused_at_their_field() {
     let house = House::shared();
@@ -216,9 +233,12 @@ fn wrong_projections_are_refused_at_their_field() {
     }
     let large = of(json!({"geometry": {"angles_deg": {"count": 60_000}, "detector": {"count": [8000, 8000]}}}));
     assert!(matches!(parsed(&large), Err(Error::TooLarge { .. })));
+    // A field is refused before it is computed, too.
     let beside = json!({"geometry": {"detector": {"count": [9, 1], "offset_mm": [500, 0]}}});
-    match parsed(&of(beside)) {
-        Err(Error::Invalid(violations)) => assert_eq!(violations[0].detail, "no ray of it meets the volume"),
-        other => panic!("{other:?}"),
+    for volume in [json!({"builtin": "sphere", "resolution": 8}), json!({"photon_transport": {"grid": [4, 4, 4]}})] {
+        match parsed(&json!({"technique": "project", "volume": volume, "project": beside})) {
+            Err(Error::Invalid(violations)) => assert_eq!(violations[0].detail, "no ray of it meets the volume"),
+            other => panic!("{volume}: {other:?}"),
+        }
     }
 }

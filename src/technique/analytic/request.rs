@@ -48,7 +48,7 @@ pub struct GridRequest {
     /// Voxels along x, y, z. Default: as many as bins along u, u and v.
     #[schemars(inner(range(min = 1, max = 2048)))]
     dims: Option<[usize; 3]>,
-    /// Their sides, mm. Default: those of bins.
+    /// Their sides, mm. Default: those of bins; of more than 2048 bins wider ones, so that all is seen.
     #[schemars(inner(range(min = 1e-6, max = 1e6)))]
     spacing_mm: Option<[f64; 3]>,
     /// The grid's centre, mm.
@@ -89,8 +89,11 @@ impl GridRequest {
     /// Voxels, their sides and the centre, mm.
     pub(in crate::technique) fn resolve(&self, geometry: &Geometry) -> ([usize; 3], [f64; 3], [f64; 3]) {
         let ([u, v], [du, dv]) = (geometry.count(), geometry.spacing_mm());
-        let dims = self.dims.unwrap_or([u.min(MOST_SIDE), u.min(MOST_SIDE), v.min(MOST_SIDE)]);
-        (dims, self.spacing_mm.unwrap_or([du, du, dv]), self.center_mm.unwrap_or_default())
+        let most = [u.min(MOST_SIDE), u.min(MOST_SIDE), v.min(MOST_SIDE)];
+        // A default grid is as wide as the detector, with wider voxels if there are more bins than voxels may be.
+        let wider = |bins: usize| if self.dims.is_none() { bins as f64 / bins.min(MOST_SIDE) as f64 } else { 1.0 };
+        let spacing = [du * wider(u), du * wider(u), dv * wider(v)];
+        (self.dims.unwrap_or(most), self.spacing_mm.unwrap_or(spacing), self.center_mm.unwrap_or_default())
     }
 }
 

@@ -119,6 +119,14 @@ async fn wrong_forms_are_refused_at_their_part() {
         names(&problem(post(&api, form).await, 422, what).await, at, what);
     }
     problem(post(&api, form(&meta, b"PK\x03\x04".to_vec())).await, 415, "a zip").await;
+    // What a parser of nested literals would never end with, and JSON beyond the limit of JSON.
+    let nested = [b"\x93NUMPY\x01\x00\x28\x00".to_vec(), vec![b'['; 40]].concat();
+    names(&problem(post(&api, form(&meta, nested)).await, 422, "nested").await, "/data/header:descr", "nested");
+    let long = Form::new().text("meta", "[1,".repeat(1 << 20)).part("data", Part::bytes(counts()));
+    problem(post(&api, long).await, 413, "a long meta").await;
+    let named = Part::bytes(counts()).file_name(format!("{}\n", "n".repeat(5000)));
+    let taken = post(&api, Form::new().text("meta", meta.to_string()).part("data", named)).await;
+    assert!(taken.json::<Value>().await.unwrap()["name"].as_str().unwrap().len() <= 200);
     let send = |kind: &'static str, body: Vec<u8>| {
         api.request(Method::POST, "/v1/sinograms").header("Content-Type", kind).body(body).send()
     };
@@ -129,7 +137,7 @@ async fn wrong_forms_are_refused_at_their_part() {
 
 #[tokio::test]
 async fn a_measurement_is_kept_and_reconstructed() {
-    let server = shared();
+    let server = Server::start();
     let api = Api::new(&server);
     let geometry = json!({"angles_deg": {"count": 50}, "detector": {"count": [64, 1], "spacing_mm": [0.7, 1]}});
     let disc = json!({"phantom": {"shapes": [{"type": "ellipse", "value": 0.03, "axes_mm": [12, 12]}]}});
@@ -153,6 +161,14 @@ async fn a_measurement_is_kept_and_reconstructed() {
         let render = json!({"technique": "slice", "volume": {"fbp": {"sinogram": {"id": id}}}, "image": {"width": 32, "height": 32}, "budget": {"samples": 1}});
         assert_eq!(api.finish(&render).await["result"]["views"], json!(views));
     }
+    // A cancelled measurement keeps nothing.
+    let before = api.get_json("/v1/sinograms").await["sinograms"].as_array().unwrap().len();
+    let long = json!({"of": {"phantom": {"name": "shepp_logan"}}, "geometry": {"angles_deg": {"count": 4000}, "detector": {"count": [2000, 1]}}});
+    let response = api.post_to("/v1/projections", &long).await;
+    let location = response.headers()["location"].to_str().unwrap().to_owned();
+    assert_eq!(api.delete(&location).await.status(), 200);
+    api.until_state(&location, "cancelled").await;
+    assert_eq!(api.get_json("/v1/sinograms").await["sinograms"].as_array().unwrap().len(), before);
     for (body, at) in [
         (json!({"of": {"phantom": {"name": "shepp_logan", "radius_mm": 0}}}), "/of/phantom/radius_mm"),
         (json!({"of": {"builtin": "teapot"}}), "/of/builtin"),
