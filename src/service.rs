@@ -182,12 +182,11 @@ async fn keep(service: Service, job: Arc<Job>) {
     if job.state().is_terminal() {
         return;
     }
-    let bytes = file.bytes.to_vec();
     let named = ["/project/phantom/name", "/volume/builtin"];
     let name = named.into_iter().find_map(|at| job.request().pointer(at)?.as_str()).unwrap_or("projection").to_owned();
     let stored = tokio::task::spawn_blocking(move || {
         let sinograms = service.assets().sinograms();
-        let (_, id, is_new) = sinograms.insert(bytes, &name, None)?;
+        let (_, id, is_new) = sinograms.insert(file.bytes.to_vec(), &name, None)?;
         file.result["sinogram"] = json!({"id": id});
         // A cancelled measurement leaves nothing behind.
         if !job.finish_file(file) && is_new { sinograms.delete(&id) } else { Ok(()) }

@@ -39,22 +39,21 @@ pub(super) async fn create(State(app): State<App>, request: Request<Body>) -> Re
     let _turn = app.uploads.acquire().await.map_err(Error::internal)?;
     let limit = app.service.limits().max_body_bytes;
     let bytes = problem::read_body(&head.headers, body, limit, app.request_timeout).await?;
-    let (bytes, name, how) = match boundary {
-        Some(boundary) => {
-            let most = app.service.limits().max_json_bytes;
-            of_form(form::parts(bytes, boundary, &PARTS).await?, name, most)?
-        }
-        None => (bytes, name, None),
+    // The parts of a form are as large as the body, so they are joined beside the runtime's own threads.
+    let (parts, bytes) = match boundary {
+        Some(boundary) => (Some(form::parts(bytes, boundary, &PARTS).await?), Vec::new()),
+        None => (None, bytes),
     };
-    if bytes.is_empty() {
-        return Err(Error::invalid(
-            "",
-            "the body is empty",
-            "a form with `meta` and `data`, or a NRRD with the key geometry:={…}",
-        ));
-    }
     let service = app.service.clone();
     let insert = move || -> Result<(SinogramInfo, bool)> {
+        let (bytes, name, how) = match parts {
+            Some(parts) => of_form(parts, name, service.limits().max_json_bytes)?,
+            None => (bytes, name, None),
+        };
+        if bytes.is_empty() {
+            let permitted = "a form with `meta` and `data`, or a NRRD with the key geometry:={…}";
+            return Err(Error::invalid("", "the body is empty", permitted));
+        }
         let (sinogram, id, new) = service.assets().sinograms().insert(bytes, &name, how)?;
         Ok((sinogram.info(&id, true), new))
     };

@@ -13,7 +13,7 @@ pub const CASE: Case = Case {
     name: "project",
     title: "Projections of a smooth body",
     when: "a volume, and want its sinogram",
-    choose: "`joseph` on voxels of the bins' size: half the side of a voxel is a quarter of the error, for four times the work where all planes are seen",
+    choose: "`joseph` on voxels of the bins' size: half the side of a voxel is a quarter of the error, for twice the planes along each ray",
     trial,
 };
 
